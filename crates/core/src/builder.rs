@@ -1,0 +1,251 @@
+//! Descriptions of bodies and colliders, with rapier's names.
+
+use crate::error::{Result, check};
+use crate::shape::Shape;
+use glam::{Quat, Vec3};
+
+/// What may move a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum RigidBodyType {
+    /// Nothing.
+    Fixed,
+    /// The velocity that the user sets, and nothing else.
+    KinematicVelocityBased,
+    /// Forces, impulses and contacts.
+    Dynamic,
+}
+
+/// Describes a body. Units: m, s, kg, rad.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RigidBodyBuilder {
+    pub(crate) body_type: RigidBodyType,
+    pub(crate) translation: Vec3,
+    pub(crate) rotation: Quat,
+    pub(crate) linvel: Vec3,
+    pub(crate) angvel: Vec3,
+    pub(crate) gravity_scale: f32,
+    pub(crate) linear_damping: f32,
+    pub(crate) angular_damping: f32,
+}
+
+const FINITE: &str = "finite numbers";
+/// Beyond this a float cannot hold a position to better than half a metre.
+const WORLD: &str = "finite numbers within 1e7 m of the origin";
+const SPEED: &str = "finite numbers up to 1e6";
+
+pub(crate) fn check_position(p: Vec3, what: impl FnOnce() -> String, field: &'static str) -> Result<()> {
+    check(p.is_finite() && p.abs().max_element() <= 1e7, what, field, p.to_array(), WORLD)
+}
+
+pub(crate) fn check_rotation(q: Quat, what: impl FnOnce() -> String, field: &'static str) -> Result<()> {
+    let length = q.length();
+    check(
+        q.is_finite() && (0.5..=2.0).contains(&length),
+        what,
+        field,
+        q.to_array(),
+        "a finite quaternion of length near 1 (it is normalised)",
+    )
+}
+
+pub(crate) fn check_speed(v: Vec3, what: impl FnOnce() -> String, field: &'static str) -> Result<()> {
+    check(v.is_finite() && v.abs().max_element() <= 1e6, what, field, v.to_array(), SPEED)
+}
+
+pub(crate) fn check_finite(v: Vec3, what: impl FnOnce() -> String, field: &'static str) -> Result<()> {
+    check(v.is_finite(), what, field, v.to_array(), FINITE)
+}
+
+impl RigidBodyBuilder {
+    fn new(body_type: RigidBodyType) -> Self {
+        Self {
+            body_type,
+            translation: Vec3::ZERO,
+            rotation: Quat::IDENTITY,
+            linvel: Vec3::ZERO,
+            angvel: Vec3::ZERO,
+            gravity_scale: 1.0,
+            linear_damping: 0.0,
+            angular_damping: 0.0,
+        }
+    }
+    /// A body that never moves.
+    pub fn fixed() -> Self {
+        Self::new(RigidBodyType::Fixed)
+    }
+    /// A body moved by forces and contacts.
+    pub fn dynamic() -> Self {
+        Self::new(RigidBodyType::Dynamic)
+    }
+    /// A body that keeps the velocity it is given and pushes what it meets.
+    pub fn kinematic_velocity_based() -> Self {
+        Self::new(RigidBodyType::KinematicVelocityBased)
+    }
+    /// Origin of the body's frame in the world, m.
+    pub fn translation(mut self, translation: Vec3) -> Self {
+        self.translation = translation;
+        self
+    }
+    /// Body frame to world.
+    pub fn rotation(mut self, rotation: Quat) -> Self {
+        self.rotation = rotation;
+        self
+    }
+    /// Velocity of the centre of mass, m/s.
+    pub fn linvel(mut self, linvel: Vec3) -> Self {
+        self.linvel = linvel;
+        self
+    }
+    /// Angular velocity, world axes, rad/s.
+    pub fn angvel(mut self, angvel: Vec3) -> Self {
+        self.angvel = angvel;
+        self
+    }
+    /// Factor on the scene's gravity; 1 at first.
+    pub fn gravity_scale(mut self, scale: f32) -> Self {
+        self.gravity_scale = scale;
+        self
+    }
+    /// Share of the linear velocity lost, 1/s; 0 at first.
+    pub fn linear_damping(mut self, damping: f32) -> Self {
+        self.linear_damping = damping;
+        self
+    }
+    /// Share of the angular velocity lost, 1/s; 0 at first.
+    pub fn angular_damping(mut self, damping: f32) -> Self {
+        self.angular_damping = damping;
+        self
+    }
+
+    pub(crate) fn validate(&self, what: &impl Fn() -> String) -> Result<()> {
+        check_position(self.translation, what, "translation")?;
+        check_rotation(self.rotation, what, "rotation")?;
+        check_speed(self.linvel, what, "linvel")?;
+        check_speed(self.angvel, what, "angvel")?;
+        let scale = self.gravity_scale;
+        check(scale.is_finite() && scale.abs() <= 1e6, what, "gravity_scale", scale, "finite numbers up to 1e6")?;
+        const DAMPING: &str = "finite numbers from 0 to 1e6, 1/s";
+        let damps = |d: f32| (0.0..=1e6).contains(&d);
+        check(damps(self.linear_damping), what, "linear_damping", self.linear_damping, DAMPING)?;
+        check(damps(self.angular_damping), what, "angular_damping", self.angular_damping, DAMPING)
+    }
+}
+
+/// How the coefficients of two touching colliders become one. The stronger rule of the two colliders holds, in
+/// the order `Max`, `Multiply`, `Min`, `Average`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[repr(u32)]
+pub enum CombineRule {
+    /// Half the sum.
+    #[default]
+    Average = 0,
+    /// The smaller.
+    Min = 1,
+    /// The product.
+    Multiply = 2,
+    /// The larger.
+    Max = 3,
+}
+
+/// Describes a collider. Units: m, kg.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColliderBuilder {
+    pub(crate) shape: Shape,
+    pub(crate) translation: Vec3,
+    pub(crate) rotation: Quat,
+    pub(crate) density: f32,
+    pub(crate) mass: Option<f32>,
+    pub(crate) friction: f32,
+    pub(crate) restitution: f32,
+    pub(crate) friction_rule: CombineRule,
+    pub(crate) restitution_rule: CombineRule,
+}
+
+impl ColliderBuilder {
+    /// Any shape.
+    pub fn new(shape: Shape) -> Self {
+        Self {
+            shape,
+            translation: Vec3::ZERO,
+            rotation: Quat::IDENTITY,
+            density: 1.0,
+            mass: None,
+            friction: 0.5,
+            restitution: 0.0,
+            friction_rule: CombineRule::Average,
+            restitution_rule: CombineRule::Average,
+        }
+    }
+    /// A ball of radius `radius`, m.
+    pub fn ball(radius: f32) -> Self {
+        Self::new(Shape::Ball { radius })
+    }
+    /// A box of half extents `hx`, `hy`, `hz`, m.
+    pub fn cuboid(hx: f32, hy: f32, hz: f32) -> Self {
+        Self::new(Shape::Cuboid { half_extents: Vec3::new(hx, hy, hz) })
+    }
+    /// Everything below the plane through the collider's origin with outward normal `normal`.
+    pub fn halfspace(normal: Vec3) -> Self {
+        Self::new(Shape::HalfSpace { normal })
+    }
+    /// Origin of the collider in the body's frame, m.
+    pub fn translation(mut self, translation: Vec3) -> Self {
+        self.translation = translation;
+        self
+    }
+    /// Collider frame to body frame.
+    pub fn rotation(mut self, rotation: Quat) -> Self {
+        self.rotation = rotation;
+        self
+    }
+    /// kg/m³; 1 at first.
+    pub fn density(mut self, density: f32) -> Self {
+        self.density = density;
+        self.mass = None;
+        self
+    }
+    /// kg, in place of a density.
+    pub fn mass(mut self, mass: f32) -> Self {
+        self.mass = Some(mass);
+        self
+    }
+    /// Coulomb coefficient; 0.5 at first.
+    pub fn friction(mut self, friction: f32) -> Self {
+        self.friction = friction;
+        self
+    }
+    /// 0 (stays) to 1 (bounces back as fast as it came); 0 at first.
+    pub fn restitution(mut self, restitution: f32) -> Self {
+        self.restitution = restitution;
+        self
+    }
+    /// How friction combines with that of the other collider.
+    pub fn friction_combine_rule(mut self, rule: CombineRule) -> Self {
+        self.friction_rule = rule;
+        self
+    }
+    /// How restitution combines with that of the other collider.
+    pub fn restitution_combine_rule(mut self, rule: CombineRule) -> Self {
+        self.restitution_rule = rule;
+        self
+    }
+
+    pub(crate) fn validate(&self, what: &impl Fn() -> String) -> Result<()> {
+        self.shape.validate(what)?;
+        check_position(self.translation, what, "translation")?;
+        check_rotation(self.rotation, what, "rotation")?;
+        const POSITIVE: &str = "a finite number above 0, up to 1e12";
+        let positive = |x: f32| x > 0.0 && x <= 1e12;
+        match self.mass {
+            Some(mass) => check(positive(mass), what, "mass", mass, POSITIVE)?,
+            None => check(positive(self.density), what, "density", self.density, POSITIVE)?,
+        }
+        check((0.0..=1e6).contains(&self.friction), what, "friction", self.friction, "a finite number from 0 to 1e6")?;
+        check((0.0..=1.0).contains(&self.restitution), what, "restitution", self.restitution, "0 to 1")
+    }
+
+    /// `combine` of [`layout::Collider`](crate::layout::Collider).
+    pub(crate) fn combine(&self) -> u32 {
+        self.friction_rule as u32 | (self.restitution_rule as u32) << 2
+    }
+}

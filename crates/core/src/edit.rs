@@ -1,0 +1,247 @@
+//! Changes between steps. Each becomes a record in an ordered log; a gated pass applies the records at the start of
+//! their step, on whichever side the world runs, so that a step run again neither loses nor doubles one.
+
+use crate::builder::{ColliderBuilder, RigidBodyBuilder, check_finite, check_position, check_rotation, check_speed};
+use crate::error::{Result, check};
+use crate::handle::{BodyHandle, ColliderHandle, Inserted};
+use crate::layout::{BodyProps, Collider, EditRange, EditRecord, edit_op};
+use crate::packed::{PackedScene, pack_body};
+use crate::plan::Plan;
+use crate::poses::Pose;
+use crate::scene::Scene;
+use bytemuck::Zeroable;
+use glam::{Quat, Vec3};
+
+/// Collects edits for the next step and keeps the description of the scene in step with them.
+#[derive(Debug, Clone)]
+pub struct Editor {
+    scene: Scene,
+    plan: Plan,
+    records: Vec<EditRecord>,
+}
+
+/// The edits of one step, grouped by what they change.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct EditBatch {
+    /// Sorted by target, in the order of the calls within one.
+    pub records: Vec<EditRecord>,
+    /// One for each body or collider that changes.
+    pub ranges: Vec<EditRange>,
+}
+
+impl Editor {
+    /// Takes over a scene whose packed form a backend is about to load.
+    pub fn new(scene: Scene) -> Result<(Self, PackedScene)> {
+        let packed = PackedScene::new(&scene)?;
+        Ok((Self { scene, plan: packed.plan, records: Vec::new() }, packed))
+    }
+
+    /// The scene as edited so far. Poses and velocities in it are those at insertion.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// What the scene can need by now.
+    pub fn plan(&self) -> Plan {
+        self.plan
+    }
+
+    /// Body slots that the next step must have room for.
+    pub fn body_slots(&self) -> usize {
+        self.scene.bodies.len()
+    }
+
+    /// Collider slots that the next step must have room for.
+    pub fn collider_slots(&self) -> usize {
+        self.scene.colliders.len()
+    }
+
+    /// Adds a body with its first collider.
+    pub fn insert(&mut self, body: RigidBodyBuilder, collider: ColliderBuilder) -> Result<Inserted> {
+        let inserted = self.scene.try_insert(body, collider)?;
+        self.widen();
+        let (state, props, colliders) = pack_body(&self.scene, inserted.body)?;
+        let mut spawn = self.props_record(edit_op::SPAWN, inserted.body, &props);
+        spawn.kind = state.flags;
+        spawn.generation = state.generation;
+        self.records.push(spawn);
+        let builder = self.scene.body(inserted.body)?;
+        let (translation, rotation) = (builder.translation, builder.rotation.normalize());
+        self.push(edit_op::POSE, inserted.body, translation.extend(0.0).to_array(), rotation.to_array());
+        self.push(edit_op::VELOCITY, inserted.body, pad(state.linear_velocity), pad(state.angular_velocity));
+        for (slot, collider) in colliders {
+            self.push_collider(edit_op::COLLIDER, slot, &collider);
+        }
+        Ok(inserted)
+    }
+
+    /// Adds a further collider to a body; mass and inertia follow, the body's own frame and motion stay.
+    pub fn attach(&mut self, body: BodyHandle, collider: ColliderBuilder) -> Result<ColliderHandle> {
+        let handle = self.scene.attach(body, collider)?;
+        self.widen();
+        let (_, props, colliders) = pack_body(&self.scene, body)?;
+        let record = self.props_record(edit_op::PROPS, body, &props);
+        self.records.push(record);
+        for (slot, collider) in colliders {
+            let op = if slot == handle.slot() { edit_op::COLLIDER } else { edit_op::COLLIDER_MOVE };
+            self.push_collider(op, slot, &collider);
+        }
+        Ok(handle)
+    }
+
+    /// Removes a body with its colliders and contacts.
+    pub fn remove(&mut self, body: BodyHandle) -> Result<()> {
+        let colliders: Vec<_> = self.scene.colliders_of(body)?.into_iter().map(|(h, _)| h.slot()).collect();
+        self.scene.remove(body)?;
+        self.push(edit_op::REMOVE, body, [0.0; 4], [0.0; 4]);
+        for slot in colliders {
+            self.push_collider(edit_op::COLLIDER_REMOVE, slot, &Collider::zeroed());
+        }
+        Ok(())
+    }
+
+    /// Puts the body's own frame somewhere else.
+    pub fn set_pose(&mut self, body: BodyHandle, pose: Pose) -> Result<()> {
+        self.scene.entry(body)?;
+        check_position(pose.translation, || body.to_string(), "translation")?;
+        check_rotation(pose.rotation, || body.to_string(), "rotation")?;
+        self.push(edit_op::POSE, body, pose.translation.extend(0.0).to_array(), pose.rotation.normalize().to_array());
+        Ok(())
+    }
+
+    /// Sets the velocity of the centre of mass (m/s) and the angular velocity (rad/s, world axes).
+    pub fn set_velocity(&mut self, body: BodyHandle, linear: Vec3, angular: Vec3) -> Result<()> {
+        self.scene.entry(body)?;
+        check_speed(linear, || body.to_string(), "linear velocity")?;
+        check_speed(angular, || body.to_string(), "angular velocity")?;
+        self.push(edit_op::VELOCITY, body, pad(linear.to_array()), pad(angular.to_array()));
+        Ok(())
+    }
+
+    /// Adds an impulse (N s) at the centre of mass.
+    pub fn apply_impulse(&mut self, body: BodyHandle, impulse: Vec3) -> Result<()> {
+        self.act(edit_op::IMPULSE, body, "impulse", impulse, Vec3::ZERO)
+    }
+
+    /// Adds an angular impulse (N m s).
+    pub fn apply_torque_impulse(&mut self, body: BodyHandle, impulse: Vec3) -> Result<()> {
+        self.act(edit_op::IMPULSE, body, "torque impulse", Vec3::ZERO, impulse)
+    }
+
+    /// Adds an impulse (N s) at a point of the world.
+    pub fn apply_impulse_at_point(&mut self, body: BodyHandle, impulse: Vec3, point: Vec3) -> Result<()> {
+        self.act(edit_op::IMPULSE_AT, body, "impulse at a point", impulse, point)
+    }
+
+    /// Adds a force (N) at the centre of mass, for the next step alone.
+    pub fn add_force(&mut self, body: BodyHandle, force: Vec3) -> Result<()> {
+        self.act(edit_op::FORCE, body, "force", force, Vec3::ZERO)
+    }
+
+    /// Adds a torque (N m), for the next step alone.
+    pub fn add_torque(&mut self, body: BodyHandle, torque: Vec3) -> Result<()> {
+        self.act(edit_op::FORCE, body, "torque", Vec3::ZERO, torque)
+    }
+
+    /// Adds a force (N) at a point of the world, for the next step alone.
+    pub fn add_force_at_point(&mut self, body: BodyHandle, force: Vec3, point: Vec3) -> Result<()> {
+        self.act(edit_op::FORCE_AT, body, "force at a point", force, point)
+    }
+
+    /// Changes gravity, m/s².
+    pub fn set_gravity(&mut self, gravity: Vec3) -> Result<()> {
+        check(
+            gravity.is_finite() && gravity.length() <= 1e6,
+            || "Scene".into(),
+            "gravity",
+            gravity.to_array(),
+            "finite numbers up to 1e6 m/s²",
+        )?;
+        self.scene.gravity = gravity;
+        Ok(())
+    }
+
+    /// Puts a body in quarantine by hand: it stands still, as if fixed, until it is removed.
+    #[doc(hidden)]
+    pub fn freeze(&mut self, body: BodyHandle) -> Result<()> {
+        self.scene.entry(body)?;
+        self.push(edit_op::FREEZE, body, [0.0; 4], [0.0; 4]);
+        Ok(())
+    }
+
+    /// Test hook: sets a velocity without looking at it.
+    #[doc(hidden)]
+    pub fn poison(&mut self, body: BodyHandle, linear: Vec3, angular: Vec3) -> Result<()> {
+        self.scene.entry(body)?;
+        self.push(edit_op::VELOCITY, body, pad(linear.to_array()), pad(angular.to_array()));
+        Ok(())
+    }
+
+    /// Hands over the edits since the last call, for the step that begins now.
+    pub fn take(&mut self) -> EditBatch {
+        let mut records = std::mem::take(&mut self.records);
+        records.sort_by_key(target_key);
+        let mut ranges: Vec<EditRange> = Vec::new();
+        for (i, record) in records.iter().enumerate() {
+            match ranges.last_mut() {
+                Some(range) if target_key(&records[range.first as usize]) == target_key(record) => range.count += 1,
+                _ => ranges.push(EditRange { first: i as u32, count: 1 }),
+            }
+        }
+        EditBatch { records, ranges }
+    }
+
+    fn widen(&mut self) {
+        let needed = Plan::of(&self.scene);
+        self.plan.widen(&needed);
+    }
+
+    fn act(&mut self, op: u32, body: BodyHandle, field: &'static str, a: Vec3, b: Vec3) -> Result<()> {
+        self.scene.entry(body)?;
+        check_finite(a, || body.to_string(), field)?;
+        check_finite(b, || body.to_string(), field)?;
+        self.push(op, body, pad(a.to_array()), pad(b.to_array()));
+        Ok(())
+    }
+
+    fn push(&mut self, op: u32, body: BodyHandle, a: [f32; 4], b: [f32; 4]) {
+        let zero = [0; 4];
+        self.records.push(EditRecord {
+            op,
+            target: body.slot,
+            kind: 0,
+            generation: 0,
+            data: [a.map(f32::to_bits), b.map(f32::to_bits), zero, zero, zero],
+        });
+    }
+
+    fn props_record(&self, op: u32, body: BodyHandle, props: &BodyProps) -> EditRecord {
+        EditRecord { op, target: body.slot, kind: 0, generation: 0, data: bytemuck::cast(*props) }
+    }
+
+    fn push_collider(&mut self, op: u32, slot: usize, collider: &Collider) {
+        let words: [[u32; 4]; 4] = bytemuck::cast(*collider);
+        self.records.push(EditRecord {
+            op,
+            target: slot as u32,
+            kind: 0,
+            generation: 0,
+            data: [words[0], words[1], words[2], words[3], [0; 4]],
+        });
+    }
+}
+
+fn target_key(record: &EditRecord) -> (bool, u32) {
+    (record.op >= edit_op::COLLIDER, record.target)
+}
+
+fn pad(v: [f32; 3]) -> [f32; 4] {
+    [v[0], v[1], v[2], 0.0]
+}
+
+/// The identity, for callers that need a rotation to go with a translation.
+impl From<Vec3> for Pose {
+    fn from(translation: Vec3) -> Self {
+        Self { translation, rotation: Quat::IDENTITY }
+    }
+}

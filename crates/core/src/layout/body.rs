@@ -1,0 +1,114 @@
+use bytemuck::{Pod, Zeroable};
+
+/// Bits of [`BodyState::flags`].
+pub mod body_flags {
+    /// The slot is empty.
+    pub const NONE: u32 = 0;
+    /// Never moves.
+    pub const FIXED: u32 = 1;
+    /// Moves with the velocity that the user sets, pushed by nothing.
+    pub const KINEMATIC: u32 = 2;
+    /// Moved by forces and contacts.
+    pub const DYNAMIC: u32 = 3;
+    /// Masks the kind out of the flags.
+    pub const KIND: u32 = 3;
+    /// Quarantined: its state stopped being finite; it stands still at its last finite pose, as if fixed.
+    pub const FROZEN: u32 = 4;
+}
+
+/// What lasts of a body from step to step. 96 bytes. Position is that of the centre of mass; the body frame
+/// is the principal frame of inertia. Written only when a step commits.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct BodyState {
+    /// Centre of mass in the world, m.
+    pub position: [f32; 3],
+    /// [`body_flags`].
+    pub flags: u32,
+    /// Principal frame to world, unit quaternion x y z w.
+    pub rotation: [f32; 4],
+    /// m/s.
+    pub linear_velocity: [f32; 3],
+    /// Generation of the handle.
+    pub generation: u32,
+    /// rad/s, world frame.
+    pub angular_velocity: [f32; 3],
+    /// Unused.
+    pub pad_a: u32,
+    /// Force of the coming step, N; cleared when it commits.
+    pub force: [f32; 3],
+    /// Unused.
+    pub pad_b: u32,
+    /// Torque of the coming step about the centre of mass, N m, world frame.
+    pub torque: [f32; 3],
+    /// Unused.
+    pub pad_c: u32,
+}
+
+/// What a body is made of; changes only by edits. 80 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct BodyProps {
+    /// 1 / principal moments, 1/(kg m²); zero for what does not turn.
+    pub inverse_inertia: [f32; 3],
+    /// 1/kg; zero for fixed and kinematic bodies.
+    pub inverse_mass: f32,
+    /// Principal moments of inertia, kg m².
+    pub inertia: [f32; 3],
+    /// Factor on gravity.
+    pub gravity_scale: f32,
+    /// Centre of mass in the body's own frame, m.
+    pub center_of_mass: [f32; 3],
+    /// 1/s.
+    pub linear_damping: f32,
+    /// Principal frame to the body's own frame.
+    pub frame: [f32; 4],
+    /// 1/s.
+    pub angular_damping: f32,
+    /// Unused.
+    pub pad_a: u32,
+    /// Unused.
+    pub pad_b: u32,
+    /// Unused.
+    pub pad_c: u32,
+}
+
+/// Hot state of a body within one step; built by `solver/prepare`, thrown away after the commit. 96 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct SolverBody {
+    /// m/s.
+    pub linear_velocity: [f32; 3],
+    /// 1/kg; zero when nothing may push the body.
+    pub inverse_mass: f32,
+    /// rad/s, world frame.
+    pub angular_velocity: [f32; 3],
+    /// 1 when a constraint touches the body in this step.
+    pub touched: u32,
+    /// Change of position since the step began, m.
+    pub translation: [f32; 3],
+    /// Unused.
+    pub pad_a: u32,
+    /// Change of rotation since the step began, world frame: rotation = delta * start.
+    pub delta: [f32; 4],
+    /// xx, yy, zz of the inverse inertia in the world frame at the start of the step, 1/(kg m²).
+    pub inverse_inertia_diagonal: [f32; 3],
+    /// Unused.
+    pub pad_b: u32,
+    /// xy, xz, yz of the same.
+    pub inverse_inertia_off: [f32; 3],
+    /// Unused.
+    pub pad_c: u32,
+}
+
+/// A pose as a user or renderer sees it: the body's own frame, by handle slot. 32 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct PoseRecord {
+    /// Origin of the body's own frame in the world, m.
+    pub translation: [f32; 3],
+    /// [`body_flags`]; zero when the slot is empty.
+    pub flags: u32,
+    /// Body's own frame to world, unit quaternion x y z w.
+    pub rotation: [f32; 4],
+}

@@ -1,0 +1,61 @@
+use bytemuck::{Pod, Zeroable};
+
+/// What the points of one constraint share. 48 bytes. Constraints lie in batch order.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct ConstraintHead {
+    /// From a to b, world axes, unit; held for the step.
+    pub normal: [f32; 3],
+    /// Combined Coulomb coefficient.
+    pub friction: f32,
+    /// First body.
+    pub body_a: u32,
+    /// Second body.
+    pub body_b: u32,
+    /// Where the impulses come from and go to.
+    pub slot: u32,
+    /// Points in use.
+    pub count: u32,
+    /// Combined restitution.
+    pub restitution: f32,
+    /// Unused.
+    pub pad_a: u32,
+    /// Unused.
+    pub pad_b: u32,
+    /// Unused.
+    pub pad_c: u32,
+}
+
+/// One contact point as the solver sees it. 48 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct ConstraintPoint {
+    /// From the centre of mass of a, world axes at the start of the step, m.
+    pub anchor_a: [f32; 3],
+    /// Separation less `dot(anchor_b - anchor_a, normal)`, so that the current one is this plus the moved anchors' share, m.
+    pub adjusted_separation: f32,
+    /// From the centre of mass of b, m.
+    pub anchor_b: [f32; 3],
+    /// Mass seen along the normal, kg.
+    pub normal_mass: f32,
+    /// Mass seen by friction in its stiffest direction, kg.
+    pub tangent_mass: f32,
+    /// Normal velocity before the first push of the step, m/s.
+    pub approach: f32,
+    /// Largest normal impulse of any visit in the step, N s.
+    pub max_impulse: f32,
+    /// Unused.
+    pub pad_a: u32,
+}
+
+/// Accumulated impulse of one point; lasts from step to step. 16 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Impulse {
+    /// N s, never negative.
+    pub normal: f32,
+    /// Along the two tangents that `tangents(normal)` gives, N s.
+    pub tangent: [f32; 2],
+    /// Feature that it belongs to.
+    pub feature: u32,
+}

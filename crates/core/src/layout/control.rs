@@ -1,0 +1,97 @@
+use bytemuck::{Pod, Zeroable};
+
+/// Number of batches, the last one included.
+pub const BATCHES: u32 = 64;
+/// The batch that is solved in sequence: hubs, and what the rounds could not place.
+pub const LAST_BATCH: u32 = 63;
+/// Batch of a manifold that has no constraint.
+pub const UNBATCHED: u32 = 255;
+/// How many quarantined bodies a step names; more are only counted.
+pub const QUARANTINE_NAMES: usize = 8;
+
+/// Values of [`Control::overflow`]: which buffer or bound was passed.
+pub mod overflow {
+    /// Nothing was.
+    pub const NONE: u32 = 0;
+    /// The pair list and all that is sized by it.
+    pub const PAIRS: u32 = 1;
+    /// More candidates around one collider than a shader's loop may visit.
+    pub const CELL: u32 = 2;
+    /// More constraints in the last batch than a shader's loop may visit.
+    pub const LAST_BATCH: u32 = 3;
+}
+
+/// Counters and decisions of a step, kept where the passes run. 448 bytes.
+///
+/// Everything from `pair_count` on is written anew each step. `stop` is sticky: raised in the plan phase, cleared by
+/// the host when the buffer has grown.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Control {
+    /// Non-zero: nothing of this step or a later one is committed.
+    pub stop: u32,
+    /// Which bound was passed, see [`overflow`].
+    pub overflow: u32,
+    /// Elements needed there.
+    pub needed: u32,
+    /// The last step that committed.
+    pub step: u32,
+    /// Pairs of the last committed step, in `pairs`.
+    pub old_pair_count: u32,
+    /// Slots on the free list.
+    pub free_count: u32,
+    /// 1 when the next step colours everything anew.
+    pub recolor: u32,
+    /// Bodies in quarantine, all told.
+    pub frozen_count: u32,
+
+    /// Pairs that the broad phase found.
+    pub pair_count: u32,
+    /// Pairs that the narrow phase visited.
+    pub processed: u32,
+    /// Pairs that were not in the last list.
+    pub new_count: u32,
+    /// Pairs of the last list that are gone.
+    pub dead_count: u32,
+    /// Constraints: manifolds with points.
+    pub constraint_count: u32,
+    /// Contact points.
+    pub point_count: u32,
+    /// Batches in use: one more than the highest, the last one excluded.
+    pub batch_count: u32,
+    /// Rounds that placing took.
+    pub rounds: u32,
+
+    /// Constraints left to place.
+    pub unplaced: u32,
+    /// Constraints in the last batch.
+    pub last_count: u32,
+    /// Colliders too large for the grid.
+    pub large_count: u32,
+    /// Most constraints on one dynamic body.
+    pub max_degree: u32,
+    /// Constraints that the solver visited.
+    pub solved: u32,
+    /// Impulses dropped because they were not finite.
+    pub dropped: u32,
+    /// Size class of the grid's cells.
+    pub cell_class: u32,
+    /// Bits of the cell index along x | y << 8 | z << 16.
+    pub cell_bits: u32,
+
+    /// Lowest centre of a collider, as order-preserving integers; then its float bits once the grid is chosen.
+    pub center_min: [u32; 3],
+    /// 1 / cell edge, 1/m, as float bits.
+    pub inverse_cell: u32,
+    /// Highest centre.
+    pub center_max: [u32; 3],
+    /// Unused.
+    pub pad_a: u32,
+
+    /// First constraint of each batch; the one after the last is the number of all.
+    pub batch_start: [u32; 68],
+    /// Slots of bodies newly quarantined in this step, plus one; zero where there is none.
+    pub quarantined: [u32; QUARANTINE_NAMES],
+    /// Unused.
+    pub pad_b: [u32; 4],
+}

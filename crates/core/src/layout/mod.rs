@@ -1,0 +1,20 @@
+//! The structs that both sides share with the shaders, byte for byte.
+//!
+//! Each lives once here and once in `shaders/shared/*.wgsl`; a test parses the WGSL and compares every name,
+//! offset, size and constant. Arrays are grouped by reader: one element is one to six `vec4`.
+
+mod body;
+mod collider;
+mod constraint;
+mod control;
+mod edit;
+mod manifold;
+mod step;
+
+pub use body::{BodyProps, BodyState, PoseRecord, SolverBody, body_flags};
+pub use collider::{Aabb, Collider, aabb_body, shape_kind};
+pub use constraint::{ConstraintHead, ConstraintPoint, Impulse};
+pub use control::{BATCHES, Control, LAST_BATCH, QUARANTINE_NAMES, UNBATCHED, overflow};
+pub use edit::{EditRange, EditRecord, edit_op};
+pub use manifold::{Manifold, ManifoldPoint, NO_SLOT, Pair, pair_kind};
+pub use step::StepParams;

@@ -1,0 +1,59 @@
+use bytemuck::{Pod, Zeroable};
+
+/// What one step is told, as a uniform. 112 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct StepParams {
+    /// Length of the step, s.
+    pub dt: f32,
+    /// Length of a sub-step, s.
+    pub h: f32,
+    /// 1 / h.
+    pub inverse_h: f32,
+    /// Number of sub-steps.
+    pub substeps: u32,
+    /// m/s².
+    pub gravity: [f32; 3],
+    /// Number of the step, from 1.
+    pub step: u32,
+    /// Soft contact: share of the overlap undone, 1/s.
+    pub bias_rate: f32,
+    /// Soft contact: factor on the mass.
+    pub mass_scale: f32,
+    /// Soft contact: share of the impulse that leaks.
+    pub impulse_scale: f32,
+    /// Fastest speed at which overlap is undone, m/s.
+    pub push_speed: f32,
+    /// Gap below which a contact is kept, m.
+    pub speculative_distance: f32,
+    /// Slowest approach that bounces, m/s.
+    pub restitution_threshold: f32,
+    /// Body slots in use.
+    pub body_count: u32,
+    /// Collider slots in use.
+    pub collider_count: u32,
+    /// Room in the pair list.
+    pub pair_capacity: u32,
+    /// log2 of the number of grid cells.
+    pub cell_table_bits: u32,
+    /// Colliders that may be left out of the grid because they are large.
+    pub large_limit: u32,
+    /// Edit ranges of this step.
+    pub edit_ranges: u32,
+    /// Test hook: the pair of this index is dropped before the narrow phase.
+    pub drop_pair: u32,
+    /// 1 when the user's poses are to be written.
+    pub write_poses: u32,
+    /// Rounds in which constraints are placed in batches before the rest goes to the last one.
+    pub batch_rounds: u32,
+    /// Most constraints that the last batch may hold.
+    pub last_limit: u32,
+    /// Batches that have a dispatch of their own; the others share one.
+    pub wide_batches: u32,
+    /// Index of the running sub-step's phase; unused by most passes.
+    pub pad_a: u32,
+    /// Unused.
+    pub pad_b: u32,
+    /// Unused.
+    pub pad_c: u32,
+}

@@ -1,0 +1,37 @@
+//! The ground floor of `tumble`: what a scene is, how it lies in memory, what a step is told and what it
+//! reports. No pass lives here; both backends build on this crate and neither sees the other.
+//!
+//! Data flows one way: [`Scene`] (builders, handles) → [`PackedScene`] (flat arrays) → a backend's buffers →
+//! [`StepReport`] and poses.
+
+mod builder;
+pub mod edit;
+mod error;
+mod handle;
+pub mod layout;
+mod mass;
+pub mod measures;
+mod packed;
+mod params;
+pub mod plan;
+mod poses;
+mod report;
+mod scene;
+pub mod scenes;
+mod shape;
+pub mod validate;
+
+pub use builder::{ColliderBuilder, CombineRule, RigidBodyBuilder, RigidBodyType};
+pub use edit::Editor;
+pub use error::{Error, Result};
+pub use handle::{BodyHandle, ColliderHandle, Inserted};
+pub use mass::MassProperties;
+pub use packed::PackedScene;
+pub use params::{Broadphase, Capacities, Params};
+pub use plan::Plan;
+pub use poses::{Pose, Poses, Velocities, Velocity};
+pub use report::{Penetration, StageTime, StepReport};
+pub use scene::Scene;
+pub use shape::Shape;
+
+pub use glam;

@@ -1,0 +1,122 @@
+//! A scene as flat arrays, ready for a backend's buffers. Index = handle slot.
+
+use crate::builder::RigidBodyType;
+use crate::error::Result;
+use crate::handle::BodyHandle;
+use crate::layout::{BodyProps, BodyState, Collider, body_flags};
+use crate::mass::MassProperties;
+use crate::plan::Plan;
+use crate::scene::Scene;
+use crate::shape::Shape;
+use bytemuck::Zeroable;
+use glam::{Quat, Vec3};
+
+/// Everything a backend needs to begin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PackedScene {
+    /// m/s².
+    pub gravity: Vec3,
+    /// By body slot; empty slots are zero.
+    pub states: Vec<BodyState>,
+    /// By body slot.
+    pub props: Vec<BodyProps>,
+    /// By collider slot; empty slots are zero.
+    pub colliders: Vec<Collider>,
+    /// What the scene can need.
+    pub plan: Plan,
+}
+
+impl PackedScene {
+    /// Packs a valid scene; else says what is not allowed.
+    pub fn new(scene: &Scene) -> Result<Self> {
+        scene.validate()?;
+        let mut packed = Self {
+            gravity: scene.gravity,
+            states: vec![BodyState::zeroed(); scene.bodies.len()],
+            props: vec![BodyProps::zeroed(); scene.bodies.len()],
+            colliders: vec![Collider::zeroed(); scene.colliders.len()],
+            plan: Plan::of(scene),
+        };
+        for body in scene.bodies() {
+            let (state, props, colliders) = pack_body(scene, body)?;
+            packed.states[body.slot()] = state;
+            packed.props[body.slot()] = props;
+            for (slot, collider) in colliders {
+                packed.colliders[slot] = collider;
+            }
+        }
+        Ok(packed)
+    }
+}
+
+/// State, properties and colliders (by slot) of one body.
+pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<(BodyState, BodyProps, Vec<(usize, Collider)>)> {
+    let builder = &scene.entry(body)?.builder;
+    let dynamic = builder.body_type == RigidBodyType::Dynamic;
+    // What nothing pushes keeps its own frame: its mass is never used.
+    let mass = if dynamic {
+        scene.mass_properties(body)?
+    } else {
+        MassProperties {
+            mass: 0.0,
+            center_of_mass: Vec3::ZERO,
+            principal_inertia: Vec3::ZERO,
+            principal_frame: Quat::IDENTITY,
+        }
+    };
+    let rotation = builder.rotation.normalize();
+    let state = BodyState {
+        position: (builder.translation + rotation * mass.center_of_mass).to_array(),
+        flags: body_kind(builder.body_type),
+        rotation: (rotation * mass.principal_frame).normalize().to_array(),
+        linear_velocity: if builder.body_type == RigidBodyType::Fixed { [0.0; 3] } else { builder.linvel.to_array() },
+        generation: body.generation(),
+        angular_velocity: if builder.body_type == RigidBodyType::Fixed { [0.0; 3] } else { builder.angvel.to_array() },
+        ..BodyState::zeroed()
+    };
+    let inverse = |x: f32| if x > 0.0 { 1.0 / x } else { 0.0 };
+    let props = BodyProps {
+        inverse_inertia: mass.principal_inertia.to_array().map(inverse),
+        inverse_mass: inverse(mass.mass),
+        inertia: mass.principal_inertia.to_array(),
+        gravity_scale: builder.gravity_scale,
+        center_of_mass: mass.center_of_mass.to_array(),
+        linear_damping: builder.linear_damping,
+        frame: mass.principal_frame.to_array(),
+        angular_damping: builder.angular_damping,
+        ..BodyProps::zeroed()
+    };
+    let to_principal = mass.principal_frame.inverse();
+    let colliders = scene
+        .colliders_of(body)?
+        .into_iter()
+        .map(|(handle, c)| {
+            let (size, shape) = c.shape.pack();
+            let own = match c.shape {
+                Shape::HalfSpace { normal } => Quat::from_rotation_arc(Vec3::Y, normal.normalize()),
+                _ => Quat::IDENTITY,
+            };
+            let collider = Collider {
+                size,
+                shape,
+                position: (to_principal * (c.translation - mass.center_of_mass)).to_array(),
+                body: body.slot,
+                rotation: (to_principal * c.rotation.normalize() * own).normalize().to_array(),
+                friction: c.friction,
+                restitution: c.restitution,
+                combine: c.combine(),
+                born: 0,
+            };
+            (handle.slot(), collider)
+        })
+        .collect();
+    Ok((state, props, colliders))
+}
+
+fn body_kind(body_type: RigidBodyType) -> u32 {
+    match body_type {
+        RigidBodyType::Fixed => body_flags::FIXED,
+        RigidBodyType::KinematicVelocityBased => body_flags::KINEMATIC,
+        RigidBodyType::Dynamic => body_flags::DYNAMIC,
+    }
+}

@@ -1,0 +1,180 @@
+//! What the user may set, with units and defaults.
+
+use crate::error::{Result, check};
+use crate::layout::StepParams;
+use glam::Vec3;
+
+/// Which broad phase finds the pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
+pub enum Broadphase {
+    /// The best one for the scene; today the grid.
+    #[default]
+    Auto,
+    /// Uniform grid; colliders larger than a cell are tested apart.
+    Grid,
+}
+
+/// Room in the buffers whose need is known only while a step runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Capacities {
+    /// Pairs of overlapping bounding boxes; `None`: eight a collider, at least 1,024.
+    pub pairs: Option<u32>,
+    /// Whether buffers may grow when a step needs more; else [`Error::Capacity`](crate::Error::Capacity).
+    pub grow: bool,
+    /// No single array grows past this many bytes (a GPU's binding limit, 128 MiB by default, may lie below it).
+    pub max_array_bytes: u64,
+}
+
+impl Default for Capacities {
+    fn default() -> Self {
+        Self { pairs: None, grow: true, max_array_bytes: 2 << 30 }
+    }
+}
+
+/// Parameters of a world. Change them between steps with `set_params`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Params {
+    /// Length of a step, s. 1/60 at first.
+    pub dt: f32,
+    /// Sub-steps a step: collisions are found once a step, contacts solved once a sub-step. 4 at first.
+    pub substeps: u32,
+    /// Natural frequency of soft contacts as a share of the sub-step rate. Contacts rest at a depth of
+    /// load / (mass (2 pi f)²), so more sub-steps make them stiffer. 0.125 at first (30 Hz at 4 sub-steps
+    /// of 1/60 s); walls begin to rock from about there on.
+    pub contact_frequency: f32,
+    /// Damping ratio of soft contacts. 10 at first.
+    pub contact_damping_ratio: f32,
+    /// Fastest speed at which overlap is undone, m/s. 3 at first.
+    pub max_push_speed: f32,
+    /// Gap below which a contact is kept before the surfaces meet, m. 0.005 at first.
+    pub speculative_distance: f32,
+    /// Slowest approach that bounces, m/s. 0.5 at first.
+    pub restitution_threshold: f32,
+    /// Which broad phase.
+    pub broadphase: Broadphase,
+    /// Room in buffers.
+    pub capacities: Capacities,
+    /// Worker threads of the CPU side; `None`: one a core. The result is the same for any number.
+    pub threads: Option<usize>,
+    /// Time each stage. Off at first; free when off.
+    pub profile: bool,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            dt: 1.0 / 60.0,
+            substeps: 4,
+            contact_frequency: 0.125,
+            contact_damping_ratio: 10.0,
+            max_push_speed: 3.0,
+            speculative_distance: 0.005,
+            restitution_threshold: 0.5,
+            broadphase: Broadphase::Auto,
+            capacities: Capacities::default(),
+            threads: None,
+            profile: false,
+        }
+    }
+}
+
+impl Params {
+    /// Refuses what no step can run with, naming the field.
+    pub fn validate(&self) -> Result<()> {
+        let what = || "Params".to_string();
+        check((1e-6..=1.0).contains(&self.dt), what, "dt", self.dt, "1e-6 to 1 s")?;
+        check((1..=256).contains(&self.substeps), what, "substeps", self.substeps, "1 to 256")?;
+        check(
+            (1e-3..=0.2).contains(&self.contact_frequency),
+            what,
+            "contact_frequency",
+            self.contact_frequency,
+            "0.001 to 0.2 (above, soft contacts are unstable)",
+        )?;
+        check(
+            (0.1..=1000.0).contains(&self.contact_damping_ratio),
+            what,
+            "contact_damping_ratio",
+            self.contact_damping_ratio,
+            "0.1 to 1000",
+        )?;
+        check((0.0..=1e6).contains(&self.max_push_speed), what, "max_push_speed", self.max_push_speed, "0 to 1e6 m/s")?;
+        check(
+            (0.0..=1e3).contains(&self.speculative_distance),
+            what,
+            "speculative_distance",
+            self.speculative_distance,
+            "0 to 1000 m",
+        )?;
+        check(
+            (0.0..=1e6).contains(&self.restitution_threshold),
+            what,
+            "restitution_threshold",
+            self.restitution_threshold,
+            "0 to 1e6 m/s",
+        )?;
+        if let Some(threads) = self.threads {
+            check((1..=1024).contains(&threads), what, "threads", threads, "1 to 1024")?;
+        }
+        if let Some(pairs) = self.capacities.pairs {
+            check((1..=1 << 26).contains(&pairs), what, "capacities.pairs", pairs, "1 to 67,108,864")?;
+        }
+        Ok(())
+    }
+
+    /// The part of a step's uniform that follows from the parameters alone.
+    pub fn step_params(&self, step: u32, gravity: Vec3) -> StepParams {
+        let h = self.dt / self.substeps as f32;
+        // Soft constraint (Catto, "Soft Constraints", GDC 2011; "Solver2D", 2024): a damped spring of angular
+        // frequency w = 2 pi f and damping ratio z, integrated implicitly.
+        let hw = std::f32::consts::TAU * self.contact_frequency;
+        let a1 = 2.0 * self.contact_damping_ratio + hw;
+        let a2 = hw * a1;
+        let a3 = 1.0 / (1.0 + a2);
+        StepParams {
+            dt: self.dt,
+            h,
+            inverse_h: 1.0 / h,
+            substeps: self.substeps,
+            gravity: gravity.to_array(),
+            step,
+            bias_rate: hw / (h * a1),
+            mass_scale: a2 * a3,
+            impulse_scale: a3,
+            push_speed: self.max_push_speed,
+            speculative_distance: self.speculative_distance,
+            restitution_threshold: self.restitution_threshold,
+            drop_pair: u32::MAX,
+            batch_rounds: BATCH_ROUNDS,
+            last_limit: LAST_LIMIT,
+            write_poses: 1,
+            ..bytemuck::Zeroable::zeroed()
+        }
+    }
+}
+
+/// Rounds of placing before the rest goes to the last batch; each round places at least one constraint, and in
+/// practice a constant share.
+pub const BATCH_ROUNDS: u32 = 96;
+
+/// Most constraints in the last batch: each is one turn of a loop, and some drivers end loops at 65,535 turns.
+pub const LAST_LIMIT: u32 = 32_768;
+
+/// Most candidates around one collider that the grid visits: the same bound.
+pub const CELL_LOOP_LIMIT: u32 = 50_000;
+
+/// How large the grid's cell table is for `colliders` colliders: log2 of at least two cells each.
+pub fn cell_table_bits(colliders: u32) -> u32 {
+    (colliders.max(1) * 2).next_power_of_two().trailing_zeros().clamp(6, 24)
+}
+
+/// How many colliders may be left out of the grid because they are larger than a cell.
+pub fn large_limit(colliders: u32) -> u32 {
+    8 + (colliders / 1024).min(56)
+}
+
+/// Room in the pair list at first.
+pub fn initial_pairs(capacities: &Capacities, colliders: u32) -> u32 {
+    capacities.pairs.unwrap_or_else(|| colliders.saturating_mul(8).max(1024))
+}

@@ -1,0 +1,66 @@
+//! Model only what a scene needs: which passes a scene can ever use.
+
+use crate::layout::pair_kind;
+use crate::scene::Scene;
+use crate::shape::Shape;
+use std::fmt;
+
+/// What may occur in a scene; a pass that the plan leaves out is not built, bound or dispatched. Edits widen it,
+/// nothing narrows it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Plan {
+    /// Bit k: pairs of kind k (see [`pair_kind`]) can occur.
+    pub pair_kinds: u32,
+    /// Some collider bounces.
+    pub restitution: bool,
+}
+
+impl Plan {
+    /// What `scene` needs.
+    pub fn of(scene: &Scene) -> Self {
+        let (mut balls, mut cuboids, mut halfspaces, mut restitution) = (0u32, 0u32, 0u32, false);
+        for (_, _, collider) in scene.colliders.iter() {
+            match collider.builder.shape {
+                Shape::Ball { .. } => balls += 1,
+                Shape::Cuboid { .. } => cuboids += 1,
+                Shape::HalfSpace { .. } => halfspaces += 1,
+            }
+            restitution |= collider.builder.restitution > 0.0;
+        }
+        let mut pair_kinds = 0;
+        let mut allow = |ok: bool, kind: u32| pair_kinds |= u32::from(ok) << kind;
+        allow(balls > 1, pair_kind::BALL_BALL);
+        allow(balls > 0 && cuboids > 0, pair_kind::BALL_CUBOID);
+        allow(cuboids > 1, pair_kind::CUBOID_CUBOID);
+        allow(balls > 0 && halfspaces > 0, pair_kind::BALL_HALFSPACE);
+        allow(cuboids > 0 && halfspaces > 0, pair_kind::CUBOID_HALFSPACE);
+        Self { pair_kinds, restitution }
+    }
+
+    /// Adds what `other` needs; true when that was anything new.
+    pub fn widen(&mut self, other: &Plan) -> bool {
+        let before = *self;
+        self.pair_kinds |= other.pair_kinds;
+        self.restitution |= other.restitution;
+        *self != before
+    }
+
+    /// Whether pairs of this kind can occur.
+    pub fn has(&self, kind: u32) -> bool {
+        self.pair_kinds >> kind & 1 != 0
+    }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const NAMES: [&str; pair_kind::COUNT as usize] =
+            ["", "ball-ball", "ball-cuboid", "cuboid-cuboid", "ball-halfspace", "cuboid-halfspace"];
+        let kinds: Vec<_> = (1..pair_kind::COUNT).filter(|&k| self.has(k)).map(|k| NAMES[k as usize]).collect();
+        write!(
+            f,
+            "pairs: {}; restitution: {}",
+            if kinds.is_empty() { "none".into() } else { kinds.join(", ") },
+            self.restitution
+        )
+    }
+}

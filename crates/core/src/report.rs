@@ -1,0 +1,120 @@
+//! What a step did.
+
+use crate::layout::{Control, QUARANTINE_NAMES};
+use std::fmt;
+
+/// Time of one stage in one step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StageTime {
+    /// The stage's name: its folder of shaders, its file, its label.
+    pub stage: &'static str,
+    /// ms; `None` where the adapter has no timestamps.
+    pub milliseconds: Option<f64>,
+}
+
+/// Overlap of all touching pairs; see [`measures`](crate::measures).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Penetration {
+    /// Deepest, m.
+    pub max_m: f64,
+    /// Mean over overlapping pairs, m.
+    pub mean_m: f64,
+}
+
+/// What one step found and did.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StepReport {
+    /// Number of the step, from 1; 0 before the first.
+    pub step: u64,
+    /// `cpu` or `gpu`.
+    pub backend: &'static str,
+    /// The adapter and driver, or the instruction set and threads of the CPU side.
+    pub adapter: String,
+    /// Bodies in the scene.
+    pub bodies: u32,
+    /// Pairs of overlapping bounding boxes.
+    pub pairs: u32,
+    /// Manifolds with points.
+    pub manifolds: u32,
+    /// Contact points.
+    pub contacts: u32,
+    /// Batches in use, the last one excluded.
+    pub batches: u32,
+    /// Rounds that placing new constraints took.
+    pub batch_rounds: u32,
+    /// Constraints solved in sequence in the last batch.
+    pub last_batch: u32,
+    /// Found minus processed, over pairs and constraints: zero, or something was lost.
+    pub lost: u64,
+    /// Impulses dropped because they were not finite.
+    pub dropped: u32,
+    /// Bodies in quarantine, all told.
+    pub quarantined: u32,
+    /// Slots of bodies newly quarantined in this step, the first few.
+    pub newly_quarantined: Vec<u32>,
+    /// How often each buffer grew since the world was made.
+    pub growths: Vec<(&'static str, u32)>,
+    /// Bytes that the world holds.
+    pub memory_bytes: u64,
+    /// Milliseconds a stage, when profiling.
+    pub stages: Vec<StageTime>,
+}
+
+impl StepReport {
+    /// The part that the counters of a committed step tell.
+    pub fn from_control(control: &Control) -> Self {
+        let lost = (control.pair_count - control.processed.min(control.pair_count)) as u64
+            + (control.constraint_count - control.solved.min(control.constraint_count)) as u64;
+        Self {
+            step: control.step as u64,
+            pairs: control.pair_count,
+            manifolds: control.constraint_count,
+            contacts: control.point_count,
+            batches: control.batch_count,
+            batch_rounds: control.rounds,
+            last_batch: control.last_count,
+            lost,
+            dropped: control.dropped,
+            quarantined: control.frozen_count,
+            newly_quarantined: control.quarantined[..QUARANTINE_NAMES]
+                .iter()
+                .filter(|&&s| s != 0)
+                .map(|s| s - 1)
+                .collect(),
+            ..Self::default()
+        }
+    }
+
+    /// How often `buffer` grew.
+    pub fn growths_of(&self, buffer: &str) -> u32 {
+        self.growths.iter().find(|(name, _)| *name == buffer).map_or(0, |(_, n)| *n)
+    }
+}
+
+impl fmt::Display for StepReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "step {} on {} ({}): {} bodies, {} pairs, {} contacts in {} manifolds, {} batches (+{} in sequence)",
+            self.step,
+            self.backend,
+            self.adapter,
+            self.bodies,
+            self.pairs,
+            self.contacts,
+            self.manifolds,
+            self.batches,
+            self.last_batch
+        )?;
+        if self.lost > 0 {
+            write!(f, "; LOST {}", self.lost)?;
+        }
+        if self.quarantined > 0 {
+            write!(f, "; {} in quarantine (new: {:?})", self.quarantined, self.newly_quarantined)?;
+        }
+        for (buffer, n) in &self.growths {
+            write!(f, "; `{buffer}` grew {n} times")?;
+        }
+        Ok(())
+    }
+}
