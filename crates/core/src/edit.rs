@@ -77,10 +77,13 @@ impl Editor {
 
     /// Adds a further collider to a body; mass and inertia follow, the body's own frame and motion stay.
     pub fn attach(&mut self, body: BodyHandle, collider: ColliderBuilder) -> Result<ColliderHandle> {
+        let (_, before, _) = pack_body(&self.scene, body)?;
         let handle = self.scene.attach(body, collider)?;
         self.widen();
         let (_, props, colliders) = pack_body(&self.scene, body)?;
-        let record = self.props_record(edit_op::PROPS, body, &props);
+        let mut record = self.props_record(edit_op::PROPS, body, &props);
+        record.data[5] = pad(before.center_of_mass).map(f32::to_bits);
+        record.data[6] = before.frame.map(f32::to_bits);
         self.records.push(record);
         for (slot, collider) in colliders {
             let op = if slot == handle.slot() { edit_op::COLLIDER } else { edit_op::COLLIDER_MOVE };
@@ -211,12 +214,17 @@ impl Editor {
             target: body.slot,
             kind: 0,
             generation: 0,
-            data: [a.map(f32::to_bits), b.map(f32::to_bits), zero, zero, zero],
+            data: [a.map(f32::to_bits), b.map(f32::to_bits), zero, zero, zero, zero, zero],
         });
     }
 
     fn props_record(&self, op: u32, body: BodyHandle, props: &BodyProps) -> EditRecord {
-        EditRecord { op, target: body.slot, kind: 0, generation: 0, data: bytemuck::cast(*props) }
+        {
+            let words: [[u32; 4]; 5] = bytemuck::cast(*props);
+            let mut record = EditRecord { op, target: body.slot, ..EditRecord::zeroed() };
+            record.data[..5].copy_from_slice(&words);
+            record
+        }
     }
 
     fn push_collider(&mut self, op: u32, slot: usize, collider: &Collider) {
@@ -226,7 +234,7 @@ impl Editor {
             target: slot as u32,
             kind: 0,
             generation: 0,
-            data: [words[0], words[1], words[2], words[3], [0; 4]],
+            data: [words[0], words[1], words[2], words[3], [0; 4], [0; 4], [0; 4]],
         });
     }
 }

@@ -9,6 +9,7 @@ pub mod edit;
 mod error;
 mod handle;
 pub mod layout;
+pub mod limits;
 mod mass;
 pub mod measures;
 mod packed;

@@ -5,7 +5,8 @@ pub mod edit_op {
     /// A body comes to be: `kind` its flags, `generation` its generation, data as for `PROPS`.
     pub const SPAWN: u32 = 1;
     /// Mass properties change (a collider came): data\[0\] inverse inertia, inverse mass; 1 inertia, gravity scale;
-    /// 2 centre of mass, linear damping; 3 frame; 4 angular damping. The body's own frame stays where it is.
+    /// 2 centre of mass, linear damping; 3 frame; 4 angular damping; 5 and 6 centre of mass and frame of before. The
+    /// body's own frame stays where it is.
     pub const PROPS: u32 = 2;
     /// The body is gone.
     pub const REMOVE: u32 = 3;
@@ -31,7 +32,7 @@ pub mod edit_op {
     pub const COLLIDER_REMOVE: u32 = 13;
 }
 
-/// One edit. 96 bytes.
+/// One edit. 128 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct EditRecord {
@@ -44,7 +45,7 @@ pub struct EditRecord {
     /// Its generation.
     pub generation: u32,
     /// Arguments, by operation: floats as their bits, so that no unit ever takes an index for a subnormal float.
-    pub data: [[u32; 4]; 5],
+    pub data: [[u32; 4]; 7],
 }
 
 /// The edits of one body or one collider, in the order in which they were made. 8 bytes.

@@ -19,6 +19,10 @@ pub mod pair_kind {
     pub const CUBOID_HALFSPACE: u32 = 5;
     /// Number of kinds.
     pub const COUNT: u32 = 6;
+    /// Masks the kind out of [`Pair::kind`](super::Pair::kind).
+    pub const MASK: u32 = 255;
+    /// Set when the pair was not in the last step's list.
+    pub const FRESH: u32 = 256;
 }
 
 /// Two colliders whose boxes overlap, `a < b`; lists of them are sorted by (a, b). 16 bytes.

@@ -1,0 +1,28 @@
+//! Bounds that both sides share: of loops, which some drivers cut short in silence, and of buffers.
+
+use crate::params::Capacities;
+
+/// Rounds of placing before the rest goes to the last batch; each round places at least one constraint, and in
+/// practice a constant share.
+pub const BATCH_ROUNDS: u32 = 96;
+
+/// Most constraints in the last batch: each is one turn of a loop, and some drivers end loops at 65,535 turns.
+pub const LAST_LIMIT: u32 = 32_768;
+
+/// Most candidates around one collider that the grid visits: the same bound.
+pub const CELL_LOOP_LIMIT: u32 = 50_000;
+
+/// How large the grid's cell table is for `colliders` colliders: log2 of at least two cells each.
+pub fn cell_table_bits(colliders: u32) -> u32 {
+    (colliders.max(1) * 2).next_power_of_two().trailing_zeros().clamp(6, 24)
+}
+
+/// How many colliders may be left out of the grid because they are larger than a cell.
+pub fn large_limit(colliders: u32) -> u32 {
+    8 + (colliders / 1024).min(56)
+}
+
+/// Room in the pair list at first.
+pub fn initial_pairs(capacities: &Capacities, colliders: u32) -> u32 {
+    capacities.pairs.unwrap_or_else(|| colliders.saturating_mul(8).max(1024))
+}
