@@ -18,14 +18,22 @@ pub enum RigidBodyType {
 /// Describes a body. Units: m, s, kg, rad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RigidBodyBuilder {
-    pub(crate) body_type: RigidBodyType,
-    pub(crate) translation: Vec3,
-    pub(crate) rotation: Quat,
-    pub(crate) linvel: Vec3,
-    pub(crate) angvel: Vec3,
-    pub(crate) gravity_scale: f32,
-    pub(crate) linear_damping: f32,
-    pub(crate) angular_damping: f32,
+    /// What may move it.
+    pub body_type: RigidBodyType,
+    /// Origin of the body's frame in the world, m.
+    pub translation: Vec3,
+    /// Body frame to world.
+    pub rotation: Quat,
+    /// m/s.
+    pub linvel: Vec3,
+    /// rad/s, world axes.
+    pub angvel: Vec3,
+    /// Factor on gravity.
+    pub gravity_scale: f32,
+    /// 1/s.
+    pub linear_damping: f32,
+    /// 1/s.
+    pub angular_damping: f32,
 }
 
 const FINITE: &str = "finite numbers";
@@ -150,15 +158,24 @@ pub enum CombineRule {
 /// Describes a collider. Units: m, kg.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColliderBuilder {
-    pub(crate) shape: Shape,
-    pub(crate) translation: Vec3,
-    pub(crate) rotation: Quat,
-    pub(crate) density: f32,
-    pub(crate) mass: Option<f32>,
-    pub(crate) friction: f32,
-    pub(crate) restitution: f32,
-    pub(crate) friction_rule: CombineRule,
-    pub(crate) restitution_rule: CombineRule,
+    /// Form.
+    pub shape: Shape,
+    /// Origin in the body's frame, m.
+    pub translation: Vec3,
+    /// Collider frame to body frame.
+    pub rotation: Quat,
+    /// kg/m³, where `mass` is not given.
+    pub density: f32,
+    /// kg.
+    pub mass: Option<f32>,
+    /// Coulomb coefficient.
+    pub friction: f32,
+    /// 0 to 1.
+    pub restitution: f32,
+    /// How friction combines.
+    pub friction_rule: CombineRule,
+    /// How restitution combines.
+    pub restitution_rule: CombineRule,
 }
 
 impl ColliderBuilder {

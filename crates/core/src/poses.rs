@@ -37,6 +37,17 @@ pub type Poses = PerBody<Pose>;
 pub type Velocities = PerBody<Velocity>;
 
 impl<T> PerBody<T> {
+    /// From values by handle, for results that come from elsewhere.
+    pub fn collect(step: u64, values: impl Iterator<Item = (BodyHandle, T)>) -> Self {
+        let mut slots: Vec<Option<(u32, T)>> = Vec::new();
+        for (body, value) in values {
+            if slots.len() <= body.slot() {
+                slots.resize_with(body.slot() + 1, || None);
+            }
+            slots[body.slot()] = Some((body.generation(), value));
+        }
+        Self { step, values: slots }
+    }
     /// The value of `body`, or [`Error::StaleBody`].
     pub fn get(&self, body: BodyHandle) -> Result<&T> {
         match self.values.get(body.slot()) {

@@ -7,7 +7,7 @@ use crate::mass::MassProperties;
 use glam::Vec3;
 
 /// Most bodies or colliders in one scene: an index must fit beside two flags.
-pub const MAX_COUNT: usize = 1 << 26;
+pub(crate) const MAX_COUNT: usize = 1 << 26;
 
 #[derive(Debug, Clone)]
 pub(crate) struct BodyEntry {

@@ -37,11 +37,11 @@ impl Shape {
                 SIZE,
             ),
             Shape::HalfSpace { normal } => check(
-                normal.is_finite() && normal.length() > 1e-6,
+                (1e-6..=1e6).contains(&normal.length()),
                 what,
                 "halfspace.normal",
                 normal.to_array(),
-                "a finite vector that is not zero",
+                "a vector of length 1e-6 to 1e6 (it is normalised)",
             ),
         }
     }

@@ -1,1 +1,19 @@
-//! stub
+//! The CPU side of `tumble`: every pass as a typed function over slices, and a world that runs them.
+//!
+//! Each file has a shader of the same stem in `shaders/`; a pass here reads like that shader. Passes run in parallel
+//! with rayon and give the same bits for any number of threads.
+
+pub mod batch;
+pub mod bounds;
+pub mod broadphase;
+pub mod contact;
+pub mod edit;
+mod math;
+pub mod motion;
+pub mod narrowphase;
+pub mod primitives;
+mod shared;
+pub mod solver;
+mod world;
+
+pub use world::World;

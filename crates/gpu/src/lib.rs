@@ -1,1 +1,20 @@
-//! stub
+//! The GPU side of `tumble`: every pass as a wgpu compute shader.
+//!
+//! [`Gpu`] is a device and what can go wrong with it, [`Pipelines`] turns a shader into passes whose bindings go by
+//! name, [`Buffers`] holds what has those names, and a [`Recorder`] records dispatches. The parts under [`primitives`]
+//! work alone, on a user's own buffers.
+
+pub mod buffers;
+pub mod device;
+pub mod pipelines;
+pub mod primitives;
+pub mod readback;
+pub mod recorder;
+mod timer;
+
+pub use buffers::Buffers;
+pub use device::Gpu;
+pub use pipelines::{Pass, Pipelines, Shader};
+pub use readback::Readback;
+pub use recorder::{Bind, BindCache, Recorder};
+pub use timer::Timer;

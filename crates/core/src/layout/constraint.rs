@@ -18,12 +18,12 @@ pub struct ConstraintHead {
     pub count: u32,
     /// Combined restitution.
     pub restitution: f32,
-    /// Unused.
-    pub pad_a: u32,
-    /// Unused.
-    pub pad_b: u32,
-    /// Unused.
-    pub pad_c: u32,
+    /// Soft contact: share of the overlap undone, 1/s.
+    pub bias_rate: f32,
+    /// Soft contact: factor on the mass.
+    pub mass_scale: f32,
+    /// Soft contact: share of the impulse that leaks.
+    pub impulse_scale: f32,
 }
 
 /// One contact point as the solver sees it. 48 bytes.

@@ -16,11 +16,11 @@ pub struct StepParams {
     pub gravity: [f32; 3],
     /// Number of the step, from 1.
     pub step: u32,
-    /// Soft contact: share of the overlap undone, 1/s.
+    /// Soft contact between bodies that move: share of the overlap undone, 1/s.
     pub bias_rate: f32,
-    /// Soft contact: factor on the mass.
+    /// Factor on the mass.
     pub mass_scale: f32,
-    /// Soft contact: share of the impulse that leaks.
+    /// Share of the impulse that leaks.
     pub impulse_scale: f32,
     /// Fastest speed at which overlap is undone, m/s.
     pub push_speed: f32,
@@ -50,10 +50,10 @@ pub struct StepParams {
     pub last_limit: u32,
     /// Batches that have a dispatch of their own; the others share one.
     pub wide_batches: u32,
-    /// Index of the running sub-step's phase; unused by most passes.
-    pub pad_a: u32,
-    /// Unused.
-    pub pad_b: u32,
-    /// Unused.
-    pub pad_c: u32,
+    /// `bias_rate` of contacts with what does not move.
+    pub static_bias_rate: f32,
+    /// `mass_scale` of those.
+    pub static_mass_scale: f32,
+    /// `impulse_scale` of those.
+    pub static_impulse_scale: f32,
 }

@@ -1,0 +1,113 @@
+//! Stage `edit`: the records of a step are applied to the working copy of the states. Twin of `shaders/edit.wgsl`.
+//!
+//! `begin` copies the committed states, `apply` runs one range of records, those of one body or collider. Writes to
+//! properties and colliders are absolute, so that a step that is run again finds what it would have found.
+
+use crate::math::{finite, quat, rotate, rotate_back, vec3};
+use glam::{Quat, Vec3};
+use tumble_core::layout::{BodyProps, BodyState, Collider, EditRange, EditRecord, body_flags, edit_op};
+
+/// What edits may change.
+pub struct Targets<'a> {
+    /// Working copy, by body slot.
+    pub states: &'a mut [BodyState],
+    /// By body slot.
+    pub props: &'a mut [BodyProps],
+    /// By collider slot.
+    pub colliders: &'a mut [Collider],
+}
+
+/// Applies the records of one body or one collider, in order.
+pub fn apply(range: EditRange, records: &[EditRecord], step: u32, targets: &mut Targets<'_>) {
+    for record in &records[range.first as usize..(range.first + range.count) as usize] {
+        let slot = record.target as usize;
+        if record.op >= edit_op::COLLIDER {
+            apply_to_collider(record, step, &mut targets.colliders[slot]);
+        } else {
+            apply_to_body(record, &mut targets.states[slot], &mut targets.props[slot]);
+        }
+    }
+}
+
+fn apply_to_collider(record: &EditRecord, step: u32, collider: &mut Collider) {
+    let words: [[u32; 4]; 4] = [record.data[0], record.data[1], record.data[2], record.data[3]];
+    let born = if record.op == edit_op::COLLIDER_MOVE { collider.born } else { step };
+    *collider = bytemuck::cast(words);
+    collider.born = born;
+}
+
+fn apply_to_body(record: &EditRecord, state: &mut BodyState, props: &mut BodyProps) {
+    let a = xyz(record.data[0]);
+    let b = xyz(record.data[1]);
+    match record.op {
+        edit_op::SPAWN => {
+            *state = bytemuck::Zeroable::zeroed();
+            state.flags = record.kind;
+            state.generation = record.generation;
+            *props = read_props(record);
+        }
+        edit_op::PROPS => {
+            let (old_com, old_frame) = (xyz(record.data[5]), xyzw(record.data[6]));
+            let position = vec3(state.position);
+            let own = quat(state.rotation) * old_frame.conjugate();
+            *props = read_props(record);
+            let moved = position + rotate(own, vec3(props.center_of_mass) - old_com);
+            let angular = vec3(state.angular_velocity);
+            state.linear_velocity = (vec3(state.linear_velocity) + angular.cross(moved - position)).to_array();
+            state.position = moved.to_array();
+            state.rotation = (own * quat(props.frame)).normalize().to_array();
+        }
+        edit_op::REMOVE => state.flags = body_flags::NONE,
+        edit_op::POSE => {
+            let own = xyzw(record.data[1]);
+            if finite(a.to_array()) && finite([own.x, own.y, own.z]) && finite([own.w; 3]) {
+                state.position = (a + rotate(own, vec3(props.center_of_mass))).to_array();
+                state.rotation = (own * quat(props.frame)).normalize().to_array();
+            } else {
+                state.flags |= body_flags::FROZEN;
+            }
+        }
+        edit_op::VELOCITY => {
+            state.linear_velocity = a.to_array();
+            state.angular_velocity = b.to_array();
+        }
+        edit_op::IMPULSE => push(state, props, a, b),
+        edit_op::IMPULSE_AT => push(state, props, a, (b - vec3(state.position)).cross(a)),
+        edit_op::FORCE => pull(state, a, b),
+        edit_op::FORCE_AT => pull(state, a, (b - vec3(state.position)).cross(a)),
+        _ => {
+            state.flags |= body_flags::FROZEN;
+            state.linear_velocity = [0.0; 3];
+            state.angular_velocity = [0.0; 3];
+        }
+    }
+}
+
+/// Adds an impulse and an angular impulse.
+fn push(state: &mut BodyState, props: &BodyProps, impulse: Vec3, angular: Vec3) {
+    let q = quat(state.rotation);
+    let linear = vec3(state.linear_velocity) + props.inverse_mass * impulse;
+    let turn = rotate(q, vec3(props.inverse_inertia) * rotate_back(q, angular));
+    state.linear_velocity = linear.to_array();
+    state.angular_velocity = (vec3(state.angular_velocity) + turn).to_array();
+}
+
+/// Adds a force and a torque for the step.
+fn pull(state: &mut BodyState, force: Vec3, torque: Vec3) {
+    state.force = (vec3(state.force) + force).to_array();
+    state.torque = (vec3(state.torque) + torque).to_array();
+}
+
+fn read_props(record: &EditRecord) -> BodyProps {
+    let mut words = [[0u32; 4]; 5];
+    words.copy_from_slice(&record.data[..5]);
+    bytemuck::cast(words)
+}
+
+fn xyz(words: [u32; 4]) -> Vec3 {
+    Vec3::new(f32::from_bits(words[0]), f32::from_bits(words[1]), f32::from_bits(words[2]))
+}
+
+fn xyzw(words: [u32; 4]) -> Quat {
+    Quat::from_array(words.map(f32::from_bits))
+}

@@ -1,0 +1,44 @@
+//! A few words of geometry in the order of operations that the shaders use (`shaders/shared/math.wgsl`).
+
+use glam::{Quat, Vec3};
+use tumble_core::layout::SolverBody;
+
+pub(crate) fn vec3(v: [f32; 3]) -> Vec3 {
+    Vec3::from_array(v)
+}
+
+pub(crate) fn quat(q: [f32; 4]) -> Quat {
+    Quat::from_array(q)
+}
+
+/// Finite by its bits, as the shaders must ask it: WGSL may assume that floats are.
+pub(crate) fn finite(v: [f32; 3]) -> bool {
+    v.iter().all(|x| x.to_bits() & 0x7f80_0000 != 0x7f80_0000)
+}
+
+/// Rotates `v` by `q` (v + 2 b x (b x v + w v)).
+pub(crate) fn rotate(q: Quat, v: Vec3) -> Vec3 {
+    let b = Vec3::new(q.x, q.y, q.z);
+    let t = 2.0 * b.cross(v);
+    v + q.w * t + b.cross(t)
+}
+
+/// Rotates `v` by the inverse of `q`.
+pub(crate) fn rotate_back(q: Quat, v: Vec3) -> Vec3 {
+    rotate(q.conjugate(), v)
+}
+
+/// The world-space inverse inertia of `body` times `v`.
+pub(crate) fn inverse_inertia_times(body: &SolverBody, v: Vec3) -> Vec3 {
+    let [xx, yy, zz] = body.inverse_inertia_diagonal;
+    let [xy, xz, yz] = body.inverse_inertia_off;
+    Vec3::new(xx * v.x + xy * v.y + xz * v.z, xy * v.x + yy * v.y + yz * v.z, xz * v.x + yz * v.y + zz * v.z)
+}
+
+/// Two unit vectors that make a frame with `n`. They jump where |n.x| passes 0.577, far from the axes along which
+/// contacts mostly lie, so that a resting contact keeps its frame.
+pub(crate) fn tangents(n: Vec3) -> (Vec3, Vec3) {
+    let t = if n.x.abs() < 0.577_350_3 { Vec3::new(0.0, n.z, -n.y) } else { Vec3::new(n.y, -n.x, 0.0) };
+    let t = t.normalize();
+    (t, n.cross(t))
+}

@@ -1,0 +1,151 @@
+//! Stage `motion`: bodies move; the step's result becomes the state. Twin of `shaders/motion.wgsl`.
+
+use crate::bounds::{STATE_LIMIT, moves};
+use crate::math::{finite, quat, rotate, rotate_back, vec3};
+use glam::{Quat, Vec3};
+use tumble_core::layout::{BodyProps, BodyState, PoseRecord, SolverBody, StepParams, body_flags};
+
+/// Largest turn of a body in a sub-step, rad; it bounds the number of pieces of a turn.
+pub const MAX_TURN: f32 = 32.0;
+
+/// Acceleration by gravity and force, m/s².
+fn acceleration(state: &BodyState, props: &BodyProps, step: &StepParams) -> Vec3 {
+    vec3(step.gravity) * props.gravity_scale + vec3(state.force) * props.inverse_mass
+}
+
+/// Gravity, force, torque and damping over one sub-step.
+pub fn integrate_velocity(body: &mut SolverBody, state: &BodyState, props: &BodyProps, step: &StepParams) {
+    if !moves(state.flags) {
+        return;
+    }
+    let linear = vec3(body.linear_velocity) + acceleration(state, props, step) * step.h;
+    body.linear_velocity = (linear * (1.0 / (1.0 + step.h * props.linear_damping))).to_array();
+    let turn = crate::math::inverse_inertia_times(body, vec3(state.torque));
+    let angular = vec3(body.angular_velocity) + turn * step.h;
+    body.angular_velocity = (angular * (1.0 / (1.0 + step.h * props.angular_damping))).to_array();
+}
+
+/// Position and rotation over one sub-step.
+///
+/// A body that no constraint touches falls by the mean of its old and new velocity (gravity in two half kicks: exact
+/// for a constant force). One that is touched moves by the velocity that its contacts were solved for.
+pub fn integrate_position(body: &mut SolverBody, state: &BodyState, props: &BodyProps, step: &StepParams) {
+    let kind = state.flags & body_flags::KIND;
+    if kind == body_flags::NONE || kind == body_flags::FIXED || state.flags & body_flags::FROZEN != 0 {
+        return;
+    }
+    let mut way = vec3(body.linear_velocity) * step.h;
+    if body.touched == 0 && kind == body_flags::DYNAMIC {
+        way -= acceleration(state, props, step) * (0.5 * step.h * step.h);
+    }
+    body.translation = (vec3(body.translation) + way).to_array();
+    turn(body, state, props, step.h);
+}
+
+/// Rotation over `h`: the implicit midpoint rule for Euler's equation in the body's frame with Cayley's map, two
+/// Newton steps, and the change of the angular velocity added as a difference, which keeps rounding out of it.
+/// Turns of more than one radian are made in pieces.
+fn turn(body: &mut SolverBody, state: &BodyState, props: &BodyProps, h: f32) {
+    let inertia = vec3(props.inertia);
+    let start = quat(state.rotation);
+    let mut angular = vec3(body.angular_velocity);
+    let mut angle = angular.length() * h;
+    if !finite([angle; 3]) {
+        return;
+    }
+    if angle > MAX_TURN {
+        angular *= MAX_TURN / angle;
+        angle = MAX_TURN;
+    }
+    let pieces = angle.ceil().max(1.0);
+    let piece = h / pieces;
+    let mut delta = quat(body.delta);
+    // Kinematic bodies and round ones turn at a constant rate.
+    let steady = !moves(state.flags) || (inertia.max_element() - inertia.min_element()) <= 1e-6 * inertia.max_element();
+    for _ in 0..pieces as u32 {
+        if steady {
+            delta = (half_turn(angular, piece) * delta).normalize();
+            continue;
+        }
+        let q0 = (delta * start).normalize();
+        let w0 = rotate_back(q0, angular);
+        let w1 = midpoint(w0, inertia, piece);
+        let mean = 0.5 * (w0 + w1);
+        let q1 = (q0 * cayley(mean, piece)).normalize();
+        angular += rotate(q1, w1) - rotate(q0, w0);
+        delta = (q1 * start.conjugate()).normalize();
+    }
+    body.delta = delta.to_array();
+    body.angular_velocity = angular.to_array();
+}
+
+/// Solves I (w1 - w0) + h m x I m = 0, m = (w0 + w1) / 2, for w1.
+fn midpoint(w0: Vec3, inertia: Vec3, h: f32) -> Vec3 {
+    let mut w = w0;
+    for _ in 0..2 {
+        let m = 0.5 * (w + w0);
+        let im = inertia * m;
+        let residual = inertia * (w - w0) + h * m.cross(im);
+        // Jacobian: diag(I) + h/2 ([m] diag(I) - [I m]), column by column.
+        let s = 0.5 * h;
+        let x = Vec3::new(inertia.x, s * (m.z * inertia.x - im.z), s * (im.y - m.y * inertia.x));
+        let y = Vec3::new(s * (im.z - m.z * inertia.y), inertia.y, s * (m.x * inertia.y - im.x));
+        let z = Vec3::new(s * (m.y * inertia.z - im.y), s * (im.x - m.x * inertia.z), inertia.z);
+        let yz = y.cross(z);
+        let determinant = x.dot(yz);
+        let solution = Vec3::new(residual.dot(yz), residual.dot(z.cross(x)), residual.dot(x.cross(y)));
+        w -= solution / determinant;
+    }
+    w
+}
+
+/// The rotation (h w / 2, 1), normalised.
+fn cayley(w: Vec3, h: f32) -> Quat {
+    let half = 0.5 * h * w;
+    Quat::from_xyzw(half.x, half.y, half.z, 1.0).normalize()
+}
+
+/// The rotation by |w| h about w.
+fn half_turn(w: Vec3, h: f32) -> Quat {
+    let half = 0.5 * h * w;
+    let angle = half.length();
+    let ratio = if angle > 1e-3 { angle.sin() / angle } else { 1.0 - angle * angle / 6.0 };
+    Quat::from_xyzw(half.x * ratio, half.y * ratio, half.z * ratio, angle.cos())
+}
+
+/// The state after the step. A result that is not finite is thrown away: the body keeps its pose and is put in
+/// quarantine. Returns the state and whether that happened.
+pub fn commit(body: &SolverBody, state: &BodyState) -> (BodyState, bool) {
+    let mut new = *state;
+    new.force = [0.0; 3];
+    new.torque = [0.0; 3];
+    if state.flags & body_flags::KIND == body_flags::NONE || state.flags & body_flags::FROZEN != 0 {
+        return (new, false);
+    }
+    let small = |v: [f32; 3]| finite(v) && vec3(v).abs().max_element() <= STATE_LIMIT;
+    let position = (vec3(state.position) + vec3(body.translation)).to_array();
+    let [x, y, z, w] = body.delta;
+    let good = small(position)
+        && small(body.linear_velocity)
+        && small(body.angular_velocity)
+        && finite([x, y, z])
+        && finite([w; 3]);
+    if good {
+        new.position = position;
+        new.rotation = (quat(body.delta) * quat(state.rotation)).normalize().to_array();
+        new.linear_velocity = body.linear_velocity;
+        new.angular_velocity = body.angular_velocity;
+    } else {
+        new.flags |= body_flags::FROZEN;
+        new.linear_velocity = [0.0; 3];
+        new.angular_velocity = [0.0; 3];
+    }
+    (new, !good)
+}
+
+/// The body's own frame, for users and renderers.
+pub fn pose(state: &BodyState, props: &BodyProps) -> PoseRecord {
+    let rotation = (quat(state.rotation) * quat(props.frame).conjugate()).normalize();
+    let translation = vec3(state.position) - rotate(rotation, vec3(props.center_of_mass));
+    PoseRecord { translation: translation.to_array(), flags: state.flags, rotation: rotation.to_array() }
+}

@@ -1,0 +1,138 @@
+//! Builds the step's solver bodies and constraint rows. Twin of `shaders/solver/prepare.wgsl`.
+
+use crate::bounds::moves;
+use crate::math::{inverse_inertia_times, quat, tangents, vec3};
+use glam::{Mat3, Vec3};
+use tumble_core::layout::{
+    BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Impulse, Manifold, Pair, SolverBody, StepParams,
+    pair_kind,
+};
+
+/// A body as the solver moves it; what nothing may push has no mass and keeps its velocity.
+pub fn prepare_body(state: &BodyState, props: &BodyProps, mask: u64) -> SolverBody {
+    let mut body = SolverBody {
+        linear_velocity: state.linear_velocity,
+        inverse_mass: 0.0,
+        angular_velocity: state.angular_velocity,
+        touched: u32::from(mask != 0),
+        translation: [0.0; 3],
+        pad_a: 0,
+        delta: [0.0, 0.0, 0.0, 1.0],
+        inverse_inertia_diagonal: [0.0; 3],
+        pad_b: 0,
+        inverse_inertia_off: [0.0; 3],
+        pad_c: 0,
+    };
+    if moves(state.flags) {
+        body.inverse_mass = props.inverse_mass;
+        // R diag(i) R^T, six of nine.
+        let r = Mat3::from_quat(quat(state.rotation));
+        let i = props.inverse_inertia;
+        let entry = |row: usize, column: usize| {
+            r.x_axis[row] * i[0] * r.x_axis[column]
+                + r.y_axis[row] * i[1] * r.y_axis[column]
+                + r.z_axis[row] * i[2] * r.z_axis[column]
+        };
+        body.inverse_inertia_diagonal = [entry(0, 0), entry(1, 1), entry(2, 2)];
+        body.inverse_inertia_off = [entry(0, 1), entry(0, 2), entry(1, 2)];
+    }
+    body
+}
+
+/// What the rows of one constraint are made of.
+pub struct Contact<'a> {
+    /// The pair with its slot.
+    pub pair: &'a Pair,
+    /// Its points.
+    pub manifold: &'a Manifold,
+    /// Impulses that the slot remembers.
+    pub stored: &'a [Impulse],
+}
+
+/// One constraint's head, points and impulses. Impulses carry over to points whose features stayed.
+pub fn prepare_constraint(
+    contact: &Contact<'_>,
+    colliders: &[Collider],
+    states: &[BodyState],
+    bodies: &[SolverBody],
+    step: &StepParams,
+    points: &mut [ConstraintPoint],
+    impulses: &mut [Impulse],
+) -> ConstraintHead {
+    let (pair, manifold) = (contact.pair, contact.manifold);
+    let (ca, cb) = (&colliders[pair.a as usize], &colliders[pair.b as usize]);
+    let (a, b) = (&bodies[ca.body as usize], &bodies[cb.body as usize]);
+    let normal = vec3(manifold.normal);
+    let (t1, t2) = tangents(normal);
+    let between = vec3(states[cb.body as usize].position) - vec3(states[ca.body as usize].position);
+    let fresh = pair.kind & pair_kind::FRESH != 0;
+    for i in 0..manifold.count as usize {
+        let ra = vec3(manifold.points[i].anchor);
+        let rb = ra - between;
+        let along = |u: Vec3, v: Vec3| response(a, b, ra, rb, u, v);
+        let (k11, k12, k22) = (along(t1, t1), along(t1, t2), along(t2, t2));
+        // The stiffest direction's mass serves all: friction stays isotropic and never overshoots.
+        let stiffest = 0.5 * (k11 + k22) + (0.25 * (k11 - k22) * (k11 - k22) + k12 * k12).sqrt();
+        let dv = point_velocity(b, rb) - point_velocity(a, ra);
+        points[i] = ConstraintPoint {
+            anchor_a: ra.to_array(),
+            adjusted_separation: manifold.points[i].separation - normal.dot(rb - ra),
+            anchor_b: rb.to_array(),
+            normal_mass: inverse(along(normal, normal)),
+            tangent_mass: inverse(stiffest),
+            approach: normal.dot(dv),
+            max_impulse: 0.0,
+            pad_a: 0,
+        };
+        let feature = manifold.features[i];
+        impulses[i] = Impulse { normal: 0.0, tangent: [0.0; 2], feature };
+        if !fresh {
+            for stored in contact.stored.iter().filter(|s| s.feature == feature) {
+                impulses[i] = *stored;
+            }
+        }
+    }
+    let soft = a.inverse_mass > 0.0 && b.inverse_mass > 0.0;
+    let (bias_rate, mass_scale, impulse_scale) = if soft {
+        (step.bias_rate, step.mass_scale, step.impulse_scale)
+    } else {
+        (step.static_bias_rate, step.static_mass_scale, step.static_impulse_scale)
+    };
+    ConstraintHead {
+        normal: manifold.normal,
+        friction: combined(ca.combine & 3, cb.combine & 3, ca.friction, cb.friction),
+        body_a: ca.body,
+        body_b: cb.body,
+        slot: pair.slot,
+        count: manifold.count,
+        restitution: combined(ca.combine >> 2 & 3, cb.combine >> 2 & 3, ca.restitution, cb.restitution),
+        bias_rate,
+        mass_scale,
+        impulse_scale,
+    }
+}
+
+/// Coefficient of two colliders by the stronger of their rules (`CombineRule`).
+fn combined(rule_a: u32, rule_b: u32, a: f32, b: f32) -> f32 {
+    match rule_a.max(rule_b) {
+        0 => 0.5 * (a + b),
+        1 => a.min(b),
+        2 => a * b,
+        _ => a.max(b),
+    }
+}
+
+/// Change of relative velocity along `v` by a unit impulse along `u`.
+fn response(a: &SolverBody, b: &SolverBody, ra: Vec3, rb: Vec3, u: Vec3, v: Vec3) -> f32 {
+    let turn_a = inverse_inertia_times(a, ra.cross(u)).cross(ra);
+    let turn_b = inverse_inertia_times(b, rb.cross(u)).cross(rb);
+    (a.inverse_mass + b.inverse_mass) * u.dot(v) + v.dot(turn_a + turn_b)
+}
+
+fn point_velocity(body: &SolverBody, r: Vec3) -> Vec3 {
+    vec3(body.linear_velocity) + vec3(body.angular_velocity).cross(r)
+}
+
+fn inverse(x: f32) -> f32 {
+    if x > 0.0 { 1.0 / x } else { 0.0 }
+}

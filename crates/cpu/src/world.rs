@@ -1,0 +1,436 @@
+//! A world on the CPU: buffers, the order of the passes, capacity and the edit log.
+
+use crate::batch::{self, Batches};
+use crate::broadphase::grid;
+use crate::contact::{self, Matched, NO_FEATURE};
+use crate::solver::{self, Rows, prepare, store};
+use crate::{bounds, edit, motion, narrowphase};
+use bytemuck::Zeroable;
+use rayon::prelude::*;
+use std::time::Instant;
+use tumble_core::edit::EditBatch;
+use tumble_core::layout::{
+    Aabb, BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Control, Impulse, Manifold, Pair,
+    PoseRecord, QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, body_flags,
+};
+use tumble_core::limits;
+use tumble_core::{Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
+
+/// A simulation on the CPU.
+pub struct World {
+    editor: Editor,
+    params: Params,
+    pool: rayon::ThreadPool,
+    kept: Kept,
+    /// A step that could not be committed: run again before the next one.
+    waiting: Option<(EditBatch, StepParams)>,
+    report: StepReport,
+    adapter: String,
+    growths: u32,
+    drop_pair: u32,
+}
+
+/// What lives past a step; written only when a step commits (properties and colliders by edits, absolutely).
+struct Kept {
+    control: Control,
+    states: Vec<BodyState>,
+    props: Vec<BodyProps>,
+    colliders: Vec<Collider>,
+    pairs: Vec<Pair>,
+    free: Vec<u32>,
+    /// By slot.
+    batch_of_slot: Vec<u32>,
+    /// Four a slot.
+    impulses: Vec<Impulse>,
+    poses: Vec<PoseRecord>,
+}
+
+/// What the plan phase of a step finds; nothing of it lasts unless the step commits.
+struct Planned {
+    states: Vec<BodyState>,
+    matched: Matched,
+    manifolds: Vec<Manifold>,
+    batches: Batches,
+    control: Control,
+}
+
+/// Milliseconds by stage, when asked for.
+struct Stopwatch {
+    last: Option<Instant>,
+    stages: Vec<StageTime>,
+}
+
+impl Stopwatch {
+    fn new(on: bool) -> Self {
+        Self { last: on.then(Instant::now), stages: Vec::new() }
+    }
+    fn lap(&mut self, stage: &'static str) {
+        if let Some(last) = &mut self.last {
+            let now = Instant::now();
+            let milliseconds = Some((now - *last).as_secs_f64() * 1e3);
+            self.stages.push(StageTime { stage, milliseconds });
+            *last = now;
+        }
+    }
+}
+
+impl World {
+    /// Loads a scene.
+    pub fn new(scene: Scene, params: Params) -> Result<Self> {
+        params.validate()?;
+        let (editor, packed) = Editor::new(scene)?;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(params.threads.unwrap_or(0)).build().map_err(|e| {
+            Error::Invalid {
+                what: "Params".into(),
+                field: "threads",
+                value: format!("{:?}", params.threads),
+                allowed: if e.to_string().is_empty() {
+                    "a number"
+                } else {
+                    "a number of threads that the system can start"
+                },
+            }
+        })?;
+        let adapter = format!("{}, {} threads", std::env::consts::ARCH, pool.current_num_threads());
+        let mut kept = Kept {
+            control: Control::zeroed(),
+            poses: packed.states.iter().zip(&packed.props).map(|(s, p)| motion::pose(s, p)).collect(),
+            states: packed.states,
+            props: packed.props,
+            colliders: packed.colliders,
+            pairs: Vec::new(),
+            free: Vec::new(),
+            batch_of_slot: Vec::new(),
+            impulses: Vec::new(),
+        };
+        kept.reserve_pairs(limits::initial_pairs(&params.capacities, kept.colliders.len() as u32));
+        Ok(Self {
+            editor,
+            params,
+            pool,
+            kept,
+            waiting: None,
+            report: StepReport::default(),
+            adapter,
+            growths: 0,
+            drop_pair: u32::MAX,
+        })
+    }
+
+    /// Edits for the next step.
+    pub fn edit(&mut self) -> &mut Editor {
+        &mut self.editor
+    }
+
+    /// The scene as edited so far.
+    pub fn scene(&self) -> &Scene {
+        self.editor.scene()
+    }
+
+    /// Parameters in force.
+    pub fn params(&self) -> &Params {
+        &self.params
+    }
+
+    /// Parameters from the next step on. The number of threads stays as it was.
+    pub fn set_params(&mut self, params: Params) -> Result<()> {
+        params.validate()?;
+        self.params = params;
+        Ok(())
+    }
+
+    /// Test hook: the next step leaves out the pair of this index.
+    #[doc(hidden)]
+    pub fn drop_pair(&mut self, index: u32) {
+        self.drop_pair = index;
+    }
+
+    /// Runs one step.
+    pub fn step(&mut self) -> Result<()> {
+        if let Some((edits, step)) = self.waiting.take() {
+            self.run(edits, step)?;
+        }
+        let edits = self.editor.take();
+        let mut step = self.params.step_params(self.kept.control.step + 1, self.editor.scene().gravity);
+        step.body_count = self.editor.body_slots() as u32;
+        step.collider_count = self.editor.collider_slots() as u32;
+        step.edit_ranges = edits.ranges.len() as u32;
+        step.cell_table_bits = limits::cell_table_bits(step.collider_count);
+        step.large_limit = limits::large_limit(step.collider_count);
+        step.drop_pair = std::mem::replace(&mut self.drop_pair, u32::MAX);
+        self.run(edits, step)
+    }
+
+    /// Waits for all steps (here they are done) and returns the last one's report.
+    pub fn sync(&mut self) -> Result<StepReport> {
+        Ok(self.report.clone())
+    }
+
+    /// All poses after the last step.
+    pub fn poses(&mut self) -> Result<Poses> {
+        let generations = self.kept.states.iter().map(|s| s.generation);
+        Ok(Poses::from_records(self.kept.control.step as u64, &self.kept.poses, generations))
+    }
+
+    /// The newest finished poses.
+    pub fn try_poses(&mut self) -> Result<Option<Poses>> {
+        self.poses().map(Some)
+    }
+
+    /// All velocities after the last step.
+    pub fn velocities(&mut self) -> Result<Velocities> {
+        Ok(Velocities::from_states(self.kept.control.step as u64, &self.kept.states))
+    }
+
+    /// Plans and commits a step, growing the pair list between where that is needed and allowed.
+    fn run(&mut self, edits: EditBatch, mut step: StepParams) -> Result<()> {
+        let restitution = self.editor.plan().restitution;
+        loop {
+            let mut watch = Stopwatch::new(self.params.profile);
+            step.pair_capacity = (self.kept.impulses.len() / 4) as u32;
+            let (kept, pool) = (&mut self.kept, &self.pool);
+            let planned = pool.install(|| kept.plan(&edits, &step, &mut watch));
+            match planned {
+                Ok(planned) => {
+                    pool.install(|| kept.commit(planned, &step, restitution, &mut watch));
+                    self.finish(watch);
+                    return Ok(());
+                }
+                Err(overflow) => {
+                    if let Err(error) = self.grow(overflow) {
+                        self.waiting = Some((edits, step));
+                        return Err(error);
+                    }
+                }
+            }
+        }
+    }
+
+    fn grow(&mut self, overflow: Overflow) -> Result<()> {
+        let Overflow { buffer, needed, capacity } = overflow;
+        let error = Error::Capacity { buffer, needed, capacity };
+        let bytes_each = size_of::<Manifold>().max(4 * size_of::<ConstraintPoint>()) as u64;
+        let room = limits::grown(needed);
+        let fits = room * bytes_each <= self.params.capacities.max_array_bytes;
+        if buffer != "pairs" || !self.params.capacities.grow || !fits {
+            return Err(error);
+        }
+        self.kept.reserve_pairs(room as u32);
+        self.growths += 1;
+        Ok(())
+    }
+
+    fn finish(&mut self, watch: Stopwatch) {
+        let mut report = StepReport::from_control(&self.kept.control);
+        report.backend = "cpu";
+        report.adapter = self.adapter.clone();
+        report.bodies = self.editor.scene().len() as u32;
+        if self.growths > 0 {
+            report.growths = vec![("pairs", self.growths)];
+        }
+        report.memory_bytes = self.kept.bytes();
+        report.stages = watch.stages;
+        self.report = report;
+    }
+}
+
+/// A bound that the plan phase found passed.
+struct Overflow {
+    buffer: &'static str,
+    needed: u64,
+    capacity: u64,
+}
+
+impl Kept {
+    fn reserve_pairs(&mut self, capacity: u32) {
+        let old = self.batch_of_slot.len() as u32;
+        // Lowest slots on top of the stack.
+        let mut free: Vec<u32> = (old..capacity).rev().collect();
+        free.append(&mut self.free);
+        self.free = free;
+        self.batch_of_slot.resize(capacity as usize, UNBATCHED);
+        let none = Impulse { normal: 0.0, tangent: [0.0; 2], feature: NO_FEATURE };
+        self.impulses.resize(4 * capacity as usize, none);
+    }
+
+    fn bytes(&self) -> u64 {
+        let step = size_of::<SolverBody>() + size_of::<BodyState>();
+        let bodies =
+            self.states.len() * (size_of::<BodyState>() + size_of::<BodyProps>() + size_of::<PoseRecord>() + step);
+        let colliders = self.colliders.len() * (size_of::<Collider>() + size_of::<Aabb>());
+        let rows = size_of::<Manifold>() + size_of::<ConstraintHead>() + 4 * size_of::<ConstraintPoint>();
+        let pair = 2 * size_of::<Pair>() + 8 * size_of::<Impulse>() + 12 + rows;
+        (bodies + colliders + self.batch_of_slot.len() * pair) as u64
+    }
+
+    /// Everything up to the first write to what lives past the step.
+    fn plan(
+        &mut self,
+        edits: &EditBatch,
+        step: &StepParams,
+        watch: &mut Stopwatch,
+    ) -> std::result::Result<Planned, Overflow> {
+        let mut control = Control { step: step.step, recolor: self.control.recolor, ..Control::zeroed() };
+        let states = self.edit(edits, step);
+        let states = self.quarantine(states, &mut control);
+        watch.lap("edit");
+        let aabbs: Vec<Aabb> =
+            self.colliders.par_iter().with_min_len(256).map(|c| self.bounds(c, &states, step)).collect();
+        watch.lap("bounds");
+        let grid = grid::choose(&aabbs, step);
+        let cells = grid::fill(&grid, &aabbs, step);
+        let found = grid::find_pairs(&grid, &cells, &aabbs);
+        watch.lap("broadphase");
+        control.pair_count = found.pairs.len() as u32;
+        control.large_count = cells.large.len() as u32;
+        control.cell_class = grid.cell_class;
+        let over = |buffer, needed: u32, capacity: u32| {
+            Err(Overflow { buffer, needed: needed as u64, capacity: capacity as u64 })
+        };
+        if grid::too_crowded(&found) {
+            return over("cell", found.most_candidates, limits::CELL_LOOP_LIMIT);
+        }
+        if control.pair_count > step.pair_capacity {
+            return over("pairs", control.pair_count, step.pair_capacity);
+        }
+        let matched = contact::match_pairs(&self.pairs, &found.pairs, &self.colliders, &self.free, step.step);
+        control.new_count = matched.new_count;
+        control.dead_count = matched.dead_slots.len() as u32;
+        watch.lap("contact");
+        let manifolds: Vec<Manifold> = matched
+            .pairs
+            .par_iter()
+            .enumerate()
+            .with_min_len(64)
+            .map(|(i, pair)| match i as u32 == step.drop_pair {
+                true => narrowphase::EMPTY,
+                false => narrowphase::collide(pair, &self.colliders, &states, step),
+            })
+            .collect();
+        control.processed = control.pair_count - u32::from(step.drop_pair < control.pair_count);
+        control.constraint_count = manifolds.iter().map(|m| u32::from(m.count > 0)).sum();
+        control.point_count = manifolds.iter().map(|m| m.count).sum();
+        watch.lap("narrowphase");
+        let body_of = |collider: u32| self.colliders[collider as usize].body;
+        let ends: Vec<_> = matched.pairs.iter().map(|p| batch::ends(p, &body_of, &states)).collect();
+        let recolor = self.control.recolor != 0;
+        let batches = batch::place(&matched.pairs, &manifolds, &ends, &self.batch_of_slot, recolor, states.len(), step);
+        control.rounds = batches.rounds;
+        control.batch_count = batches.batch_count;
+        control.max_degree = batches.max_degree;
+        control.recolor = u32::from(batch::wasteful(batches.batch_count, batches.max_degree));
+        control.batch_start[..batches.start.len()].copy_from_slice(&batches.start);
+        control.last_count = batches.order.len() as u32 - batches.start[batches.start.len() - 2];
+        control.solved = batches.order.len() as u32;
+        watch.lap("batch");
+        if control.last_count > step.last_limit {
+            return over("last batch", control.last_count, step.last_limit);
+        }
+        Ok(Planned { states, matched, manifolds, batches, control })
+    }
+
+    /// The working copy of the states with the step's edits applied.
+    fn edit(&mut self, edits: &EditBatch, step: &StepParams) -> Vec<BodyState> {
+        self.props.resize(step.body_count as usize, BodyProps::zeroed());
+        self.colliders.resize(step.collider_count as usize, Collider::zeroed());
+        let mut states = self.states.clone();
+        states.resize(step.body_count as usize, BodyState::zeroed());
+        let mut targets = edit::Targets { states: &mut states, props: &mut self.props, colliders: &mut self.colliders };
+        for range in &edits.ranges {
+            edit::apply(*range, &edits.records, step.step, &mut targets);
+        }
+        states
+    }
+
+    fn quarantine(&self, mut states: Vec<BodyState>, control: &mut Control) -> Vec<BodyState> {
+        let none = BodyState::zeroed();
+        for (slot, state) in states.iter_mut().enumerate() {
+            if bounds::quarantine(state, self.states.get(slot).unwrap_or(&none)) {
+                name(control, slot);
+            }
+        }
+        states
+    }
+
+    fn bounds(&self, collider: &Collider, states: &[BodyState], step: &StepParams) -> Aabb {
+        let body = collider.body as usize;
+        bounds::collider_bounds(collider, &states[body], &self.props[body], step)
+    }
+
+    /// Solves and writes everything that lives past the step.
+    fn commit(&mut self, planned: Planned, step: &StepParams, restitution: bool, watch: &mut Stopwatch) {
+        let Planned { states, matched, manifolds, batches, mut control } = planned;
+        let mut bodies: Vec<SolverBody> = (0..states.len())
+            .into_par_iter()
+            .with_min_len(512)
+            .map(|i| prepare::prepare_body(&states[i], &self.props[i], batches.masks[i]))
+            .collect();
+        let mut rows = self.prepare(&batches, &matched, &manifolds, &states, &bodies, step);
+        watch.lap("prepare");
+        solver::solve(&mut rows, &batches.start, &mut bodies, &states, &self.props, step, restitution);
+        watch.lap("solver");
+        contact::commit_free(&mut self.free, &matched);
+        for (i, pair) in matched.pairs.iter().enumerate() {
+            let slot = pair.slot as usize;
+            let impulses = &mut self.impulses[4 * slot..4 * slot + 4];
+            contact::commit_pair(&manifolds[i], batches.of_pair[i], &mut self.batch_of_slot[slot], impulses);
+        }
+        for (head, impulses) in rows.heads.iter().zip(rows.impulses.chunks_exact(4)) {
+            let slot = head.slot as usize;
+            store::store(head, impulses, &mut self.impulses[4 * slot..4 * slot + 4]);
+        }
+        let committed: Vec<_> =
+            bodies.par_iter().zip(&states).with_min_len(512).map(|(b, s)| motion::commit(b, s)).collect();
+        for (slot, (_, bad)) in committed.iter().enumerate() {
+            if *bad {
+                name(&mut control, slot);
+            }
+        }
+        self.states = committed.into_iter().map(|(state, _)| state).collect();
+        self.poses = self.states.iter().zip(&self.props).map(|(s, p)| motion::pose(s, p)).collect();
+        self.pairs = matched.pairs;
+        control.frozen_count = self
+            .states
+            .iter()
+            .map(|s| u32::from(s.flags & body_flags::FROZEN != 0 && s.flags & body_flags::KIND != 0))
+            .sum();
+        control.old_pair_count = self.pairs.len() as u32;
+        control.free_count = self.free.len() as u32;
+        self.control = control;
+        watch.lap("motion");
+    }
+
+    fn prepare(
+        &self,
+        batches: &Batches,
+        matched: &Matched,
+        manifolds: &[Manifold],
+        states: &[BodyState],
+        bodies: &[SolverBody],
+        step: &StepParams,
+    ) -> Rows {
+        let count = batches.order.len();
+        let mut rows = Rows {
+            heads: vec![ConstraintHead::zeroed(); count],
+            points: vec![ConstraintPoint::zeroed(); 4 * count],
+            impulses: vec![Impulse::zeroed(); 4 * count],
+        };
+        let each = rows
+            .heads
+            .par_iter_mut()
+            .zip(rows.points.par_chunks_exact_mut(4).zip(rows.impulses.par_chunks_exact_mut(4)));
+        each.zip(&batches.order).with_min_len(128).for_each(|((head, (points, impulses)), &pair)| {
+            let p = &matched.pairs[pair as usize];
+            let stored = &self.impulses[4 * p.slot as usize..4 * p.slot as usize + 4];
+            let contact = prepare::Contact { pair: p, manifold: &manifolds[pair as usize], stored };
+            *head = prepare::prepare_constraint(&contact, &self.colliders, states, bodies, step, points, impulses);
+        });
+        rows
+    }
+}
+
+/// Names a body newly in quarantine; of those that share a place, the highest slot.
+fn name(control: &mut Control, slot: usize) {
+    let place = &mut control.quarantined[slot % QUARANTINE_NAMES];
+    *place = (*place).max(slot as u32 + 1);
+}

@@ -1,0 +1,149 @@
+//! Reading back without waiting: a ring of staging buffers, mapped when the copy into them has run.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use tumble_core::{Error, Result};
+use wgpu::{BufferUsages, CommandEncoder, MapMode, PollType, SubmissionIndex};
+
+use crate::device::Gpu;
+
+const PENDING: u8 = 0;
+const MAPPED: u8 = 1;
+const FAILED: u8 = 2;
+
+/// Copies of a small buffer on their way to the host, oldest first.
+#[derive(Debug)]
+pub struct Readback {
+    name: String,
+    bytes: u64,
+    free: Vec<wgpu::Buffer>,
+    flying: VecDeque<Flight>,
+}
+
+#[derive(Debug)]
+struct Flight {
+    buffer: wgpu::Buffer,
+    state: Arc<AtomicU8>,
+    submission: Option<SubmissionIndex>,
+}
+
+impl Readback {
+    /// Room for `slots` copies of `bytes` bytes each (a multiple of 4) in flight at once.
+    ///
+    /// # Errors
+    /// As for [`Gpu::create_buffer`].
+    pub fn new(gpu: &Gpu, name: &str, bytes: u64, slots: usize) -> Result<Self> {
+        let usage = BufferUsages::COPY_DST | BufferUsages::MAP_READ;
+        let free = (0..slots).map(|_| gpu.create_buffer(name, bytes, usage)).collect::<Result<_>>()?;
+        Ok(Self { name: name.to_owned(), bytes, free, flying: VecDeque::with_capacity(slots) })
+    }
+
+    /// Copies in flight or not yet taken.
+    pub fn in_flight(&self) -> usize {
+        self.flying.len()
+    }
+
+    /// Whether every slot is in flight or not yet taken.
+    pub fn is_full(&self) -> bool {
+        self.free.is_empty()
+    }
+
+    /// Records a copy of the first bytes of `source` from `offset` on, to be mapped once the encoder's commands have
+    /// run. Returns false, and records nothing, when every slot is taken.
+    pub fn copy(&mut self, encoder: &mut CommandEncoder, source: &wgpu::Buffer, offset: u64) -> bool {
+        let Some(buffer) = self.free.pop() else { return false };
+        encoder.copy_buffer_to_buffer(source, offset, &buffer, 0, self.bytes);
+        let state = Arc::new(AtomicU8::new(PENDING));
+        let seen = Arc::clone(&state);
+        encoder.map_buffer_on_submit(&buffer, MapMode::Read, .., move |result| {
+            seen.store(if result.is_ok() { MAPPED } else { FAILED }, Ordering::Release);
+        });
+        self.flying.push_back(Flight { buffer, state, submission: None });
+        true
+    }
+
+    /// Tells in which submission the copies recorded since the last call went out, so that [`Readback::wait_take`] waits
+    /// for that one and for no later one.
+    pub fn submitted(&mut self, index: &SubmissionIndex) {
+        for flight in self.flying.iter_mut().filter(|flight| flight.submission.is_none()) {
+            flight.submission = Some(index.clone());
+        }
+    }
+
+    /// The oldest copy, when it has arrived. Does not wait.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`] when the copy will never arrive.
+    pub fn try_take(&mut self, gpu: &Gpu) -> Result<Option<Vec<u8>>> {
+        if self.flying.is_empty() {
+            return Ok(None);
+        }
+        gpu.poll(PollType::Poll)?;
+        self.take(gpu)
+    }
+
+    /// The oldest copy, waited for; `None` when none is in flight.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`] when the copy will never arrive, [`Error::Gpu`] when it was never submitted.
+    pub fn wait_take(&mut self, gpu: &Gpu) -> Result<Option<Vec<u8>>> {
+        let Some(flight) = self.flying.front() else { return Ok(None) };
+        gpu.poll(PollType::Wait { submission_index: flight.submission.clone(), timeout: None })?;
+        match self.take(gpu)? {
+            Some(bytes) => Ok(Some(bytes)),
+            None => {
+                self.drop_oldest(gpu);
+                Err(Error::Gpu { what: format!("read-back of `{}`", self.name), message: "it never arrived".into() })
+            }
+        }
+    }
+
+    fn take(&mut self, gpu: &Gpu) -> Result<Option<Vec<u8>>> {
+        let Some(flight) = self.flying.front() else { return Ok(None) };
+        match flight.state.load(Ordering::Acquire) {
+            PENDING => Ok(None),
+            MAPPED => {
+                let view = flight.buffer.get_mapped_range(..self.bytes);
+                let bytes = view.map(|view| view.to_vec());
+                flight.buffer.unmap();
+                if let Some(flight) = self.flying.pop_front() {
+                    self.free.push(flight.buffer);
+                }
+                let what = || format!("read-back of `{}`", self.name);
+                bytes.map(Some).map_err(|error| Error::Gpu { what: what(), message: error.to_string() })
+            }
+            _ => {
+                self.drop_oldest(gpu);
+                gpu.check()?;
+                Err(Error::DeviceLost { reason: format!("the read-back of `{}` could not be mapped", self.name) })
+            }
+        }
+    }
+
+    /// Gives up the oldest copy. Its buffer may still be asked for by the device, so a new one takes its slot.
+    fn drop_oldest(&mut self, gpu: &Gpu) {
+        self.flying.pop_front();
+        let usage = BufferUsages::COPY_DST | BufferUsages::MAP_READ;
+        self.free.extend(gpu.create_buffer(&self.name, self.bytes, usage));
+    }
+}
+
+/// Reads `bytes` bytes of `source` from `offset` on (multiples of 4), and waits for them.
+///
+/// # Errors
+/// As for [`Gpu::create_buffer`] and [`Readback::wait_take`].
+pub fn read_now(gpu: &Gpu, source: &wgpu::Buffer, offset: u64, bytes: u64) -> Result<Vec<u8>> {
+    if bytes == 0 {
+        return Ok(Vec::new());
+    }
+    let mut readback = Readback::new(gpu, "read", bytes, 1)?;
+    let index = gpu.scoped("a read-back", || {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        readback.copy(&mut encoder, source, offset);
+        gpu.queue.submit([encoder.finish()])
+    })?;
+    readback.submitted(&index);
+    Ok(readback.wait_take(gpu)?.unwrap_or_default())
+}

@@ -1,0 +1,57 @@
+// Bodies: what lasts, what they are made of, the hot state of one step, and poses as users see them.
+// Fields and units: crates/core/src/layout/body.rs.
+
+const BODY_NONE: u32 = 0u;
+const BODY_FIXED: u32 = 1u;
+const BODY_KINEMATIC: u32 = 2u;
+const BODY_DYNAMIC: u32 = 3u;
+const BODY_KIND: u32 = 3u;
+const BODY_FROZEN: u32 = 4u;
+
+struct BodyState {
+    position: vec3<f32>,
+    flags: u32,
+    rotation: vec4<f32>,
+    linear_velocity: vec3<f32>,
+    generation: u32,
+    angular_velocity: vec3<f32>,
+    pad_a: u32,
+    force: vec3<f32>,
+    pad_b: u32,
+    torque: vec3<f32>,
+    pad_c: u32,
+}
+
+struct BodyProps {
+    inverse_inertia: vec3<f32>,
+    inverse_mass: f32,
+    inertia: vec3<f32>,
+    gravity_scale: f32,
+    center_of_mass: vec3<f32>,
+    linear_damping: f32,
+    frame: vec4<f32>,
+    angular_damping: f32,
+    pad_a: u32,
+    pad_b: u32,
+    pad_c: u32,
+}
+
+struct SolverBody {
+    linear_velocity: vec3<f32>,
+    inverse_mass: f32,
+    angular_velocity: vec3<f32>,
+    touched: u32,
+    translation: vec3<f32>,
+    pad_a: u32,
+    delta: vec4<f32>,
+    inverse_inertia_diagonal: vec3<f32>,
+    pad_b: u32,
+    inverse_inertia_off: vec3<f32>,
+    pad_c: u32,
+}
+
+struct PoseRecord {
+    translation: vec3<f32>,
+    flags: u32,
+    rotation: vec4<f32>,
+}

@@ -1,0 +1,32 @@
+// Contacts as the solver sees them. Fields and units: crates/core/src/layout/constraint.rs.
+
+struct ConstraintHead {
+    normal: vec3<f32>,
+    friction: f32,
+    body_a: u32,
+    body_b: u32,
+    slot: u32,
+    count: u32,
+    restitution: f32,
+    bias_rate: f32,
+    mass_scale: f32,
+    impulse_scale: f32,
+}
+
+struct ConstraintPoint {
+    anchor_a: vec3<f32>,
+    adjusted_separation: f32,
+    anchor_b: vec3<f32>,
+    normal_mass: f32,
+    tangent_mass: f32,
+    approach: f32,
+    max_impulse: f32,
+    pad_a: u32,
+}
+
+// An array, not a vec2: that would be aligned to 8 bytes and the struct would not be 16.
+struct Impulse {
+    normal: f32,
+    tangent: array<f32, 2>,
+    feature: u32,
+}

@@ -1,0 +1,109 @@
+//! The same scene in rapier, for oracles and benches.
+
+use rapier3d::prelude as r;
+use tumble_core::{BodyHandle, CombineRule, Params, Pose, Poses, RigidBodyType, Scene, Shape, Velocity};
+
+/// A scene in rapier, with sleep off.
+pub struct RapierWorld {
+    pub world: r::PhysicsWorld,
+    bodies: Vec<(BodyHandle, r::RigidBodyHandle)>,
+}
+
+fn rule(rule: CombineRule) -> r::CoefficientCombineRule {
+    match rule {
+        CombineRule::Average => r::CoefficientCombineRule::Average,
+        CombineRule::Min => r::CoefficientCombineRule::Min,
+        CombineRule::Multiply => r::CoefficientCombineRule::Multiply,
+        CombineRule::Max => r::CoefficientCombineRule::Max,
+    }
+}
+
+impl RapierWorld {
+    /// Same dt, sub-steps and gravity; rapier's own defaults otherwise.
+    pub fn new(scene: &Scene, params: &Params, threads: usize) -> Self {
+        let mut world = r::PhysicsWorld { gravity: scene.gravity, ..r::PhysicsWorld::default() };
+        world.integration_parameters.dt = params.dt;
+        world.integration_parameters.num_solver_iterations = params.substeps as usize;
+        world.physics_pipeline.configure_thread_pool(threads).expect("rapier's threads start");
+        let mut bodies = Vec::new();
+        for handle in scene.bodies() {
+            let b = scene.body(handle).expect("a living body");
+            let builder = match b.body_type {
+                RigidBodyType::Fixed => r::RigidBodyBuilder::fixed(),
+                RigidBodyType::KinematicVelocityBased => r::RigidBodyBuilder::kinematic_velocity_based(),
+                RigidBodyType::Dynamic => r::RigidBodyBuilder::dynamic(),
+            };
+            let body = world.bodies.insert(
+                builder
+                    .pose(r::Pose::from_parts(b.translation, b.rotation))
+                    .linvel(b.linvel)
+                    .angvel(b.angvel)
+                    .gravity_scale(b.gravity_scale)
+                    .linear_damping(b.linear_damping)
+                    .angular_damping(b.angular_damping)
+                    .can_sleep(false),
+            );
+            for (_, c) in scene.colliders_of(handle).expect("a living body") {
+                let shape = match c.shape {
+                    Shape::Ball { radius } => r::ColliderBuilder::ball(radius),
+                    Shape::Cuboid { half_extents: h } => r::ColliderBuilder::cuboid(h.x, h.y, h.z),
+                    Shape::HalfSpace { normal } => {
+                        r::ColliderBuilder::new(r::SharedShape::halfspace(normal.normalize()))
+                    }
+                    _ => unreachable!("a shape that rapier is not told of"),
+                };
+                let collider = shape
+                    .position(r::Pose::from_parts(c.translation, c.rotation))
+                    .density(c.density)
+                    .friction(c.friction)
+                    .restitution(c.restitution)
+                    .friction_combine_rule(rule(c.friction_rule))
+                    .restitution_combine_rule(rule(c.restitution_rule));
+                let collider = c.mass.map_or(collider.clone(), |mass| collider.mass(mass));
+                world.colliders.insert_with_parent(collider, body, &mut world.bodies);
+            }
+            bodies.push((handle, body));
+        }
+        Self { world, bodies }
+    }
+
+    pub fn step(&mut self) {
+        self.world.step();
+    }
+
+    fn body(&self, handle: BodyHandle) -> &r::RigidBody {
+        let (_, body) = self.bodies.iter().find(|(h, _)| *h == handle).expect("a body of the scene");
+        &self.world.bodies[*body]
+    }
+
+    pub fn pose(&self, handle: BodyHandle) -> Pose {
+        let p = self.body(handle).position();
+        Pose { translation: p.translation, rotation: p.rotation }
+    }
+
+    pub fn velocity(&self, handle: BodyHandle) -> Velocity {
+        Velocity { linear: self.body(handle).linvel(), angular: self.body(handle).angvel() }
+    }
+
+    /// All poses, in tumble's form.
+    pub fn poses(&self) -> Poses {
+        Poses::collect(
+            0,
+            self.bodies.iter().map(|&(h, b)| {
+                let p = self.world.bodies[b].position();
+                (h, Pose { translation: p.translation, rotation: p.rotation })
+            }),
+        )
+    }
+
+    /// All velocities, in tumble's form.
+    pub fn velocities(&self) -> tumble_core::Velocities {
+        tumble_core::Velocities::collect(
+            0,
+            self.bodies.iter().map(|&(h, b)| {
+                let b = &self.world.bodies[b];
+                (h, Velocity { linear: b.linvel(), angular: b.angvel() })
+            }),
+        )
+    }
+}
