@@ -55,3 +55,8 @@ struct PoseRecord {
     flags: u32,
     rotation: vec4<f32>,
 }
+
+// Whether contacts can push the body.
+fn moves(flags: u32) -> bool {
+    return (flags & (BODY_KIND | BODY_FROZEN)) == BODY_DYNAMIC;
+}

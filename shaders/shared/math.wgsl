@@ -16,13 +16,39 @@ fn rotate_back(q: vec4<f32>, v: vec3<f32>) -> vec3<f32> {
     return rotate(conjugate(q), v);
 }
 
-// The rotation that does b, then a. The order of the sums is glam's.
+// The rotation that does b, then a. Grouped like glam's sums, which are made in vector registers.
 fn multiply(a: vec4<f32>, b: vec4<f32>) -> vec4<f32> {
     return vec4<f32>(
-        a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
-        a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
-        a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w,
-        a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z,
+        (a.w * b.x + a.x * b.w) + (a.y * b.z - a.z * b.y),
+        (a.w * b.y - a.x * b.z) + (a.y * b.w + a.z * b.x),
+        (a.w * b.z + a.x * b.y) + (a.z * b.w - a.y * b.x),
+        (a.w * b.w - a.x * b.x) + (-(a.y * b.y) - a.z * b.z),
+    );
+}
+
+// q made unit, in glam's order.
+fn unit(q: vec4<f32>) -> vec4<f32> {
+    return q / sqrt((q.x * q.x + q.z * q.z) + (q.y * q.y + q.w * q.w));
+}
+
+// The matrix of a rotation: its columns are where the axes go.
+fn mat3_from_quat(q: vec4<f32>) -> mat3x3<f32> {
+    let x2 = q.x + q.x;
+    let y2 = q.y + q.y;
+    let z2 = q.z + q.z;
+    let xx = q.x * x2;
+    let xy = q.x * y2;
+    let xz = q.x * z2;
+    let yy = q.y * y2;
+    let yz = q.y * z2;
+    let zz = q.z * z2;
+    let wx = q.w * x2;
+    let wy = q.w * y2;
+    let wz = q.w * z2;
+    return mat3x3<f32>(
+        vec3<f32>(1.0 - (yy + zz), xy + wz, xz - wy),
+        vec3<f32>(xy - wz, 1.0 - (xx + zz), yz + wx),
+        vec3<f32>(xz + wy, yz - wx, 1.0 - (xx + yy)),
     );
 }
 
@@ -47,4 +73,15 @@ fn is_finite3(v: vec3<f32>) -> bool {
 
 fn is_finite4(v: vec4<f32>) -> bool {
     return is_finite3(v.xyz) && is_finite_bits(v.w);
+}
+
+// Two unit vectors that make a frame with `n`, as columns. They jump where |n.x| passes 0.577, far from the axes along
+// which contacts mostly lie, so that a resting contact keeps its frame.
+fn tangents(n: vec3<f32>) -> mat2x3<f32> {
+    var t = vec3<f32>(n.y, -n.x, 0.0);
+    if abs(n.x) < 0.5773503 {
+        t = vec3<f32>(0.0, n.z, -n.y);
+    }
+    t = t * (1.0 / sqrt(dot(t, t)));
+    return mat2x3<f32>(t, cross(n, t));
 }

@@ -8,6 +8,8 @@ use std::fmt;
 
 /// Every shader of this crate: its stem (path below `shaders/` without `.wgsl`) and its text.
 pub const SOURCES: &[(&str, &str)] = &[
+    ("batch", include_str!("../batch.wgsl")),
+    ("motion", include_str!("../motion.wgsl")),
     ("primitives/args", include_str!("../primitives/args.wgsl")),
     ("primitives/scan", include_str!("../primitives/scan.wgsl")),
     ("primitives/sort", include_str!("../primitives/sort.wgsl")),
@@ -22,6 +24,10 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/step", include_str!("../shared/step.wgsl")),
     ("shared/thread", include_str!("../shared/thread.wgsl")),
     ("shared/workgroup", include_str!("../shared/workgroup.wgsl")),
+    ("solver/passes", include_str!("../solver/passes.wgsl")),
+    ("solver/prepare", include_str!("../solver/prepare.wgsl")),
+    ("solver/soft", include_str!("../solver/soft.wgsl")),
+    ("solver/store", include_str!("../solver/store.wgsl")),
 ];
 
 const IMPORT: &str = "//#import ";

@@ -36,8 +36,8 @@ pub fn batches(heads: &[ConstraintHead], batch_start: &[u32], moves: impl Fn(u32
     // Body -> the batch and the constraint that last touched it.
     let mut touched: HashMap<u32, (usize, usize)> = HashMap::new();
     for (batch, range) in batch_start.windows(2).enumerate() {
-        for i in range[0] as usize..range[1] as usize {
-            let head = &heads[i];
+        let (start, end) = (range[0] as usize, range[1] as usize);
+        for (i, head) in (start..).zip(&heads[start..end]) {
             if head.body_a == head.body_b {
                 return Err(format!("constraint {i} holds body {} against itself", head.body_a));
             }

@@ -234,6 +234,9 @@ fn penetration_takes_the_poses_it_is_given() {
     near(found.max_m, 0.25);
     near(found.mean_m, 0.25);
     assert_eq!(penetration(&scene, &Poses::collect(7, [].into_iter())), Default::default());
+    let floor = scene.insert(RigidBodyBuilder::fixed(), ColliderBuilder::halfspace(Vec3::Y)).body;
+    let fallen = [(floor, place(0.0)), (bodies[0], Vec3::new(0.0, f32::NEG_INFINITY, 0.0).into())];
+    assert_eq!(penetration(&scene, &Poses::collect(7, fallen.into_iter())), Default::default());
 }
 
 /// Oracle: all pairs without a sweep. Overlapping boxes, balls and compounds about a tilted half-space.

@@ -38,8 +38,15 @@ fn batch_lists() {
     batches(&sound, &[0, 3, 5], moves).expect_err("body 1 twice in batch 1");
     batches(&sound, &[0, 3, 4, 5], |_| true).expect_err("body 0 moves too");
     batches(&heads(&[(3, 3)]), &[0, 1], moves).expect_err("a body against itself");
-    for starts in [&[][..], &[1, 5], &[0, 3, 2, 5], &[0, 3], &[0, 3, 4, 6]] {
-        batches(&sound, starts, moves).expect_err("starts");
+    for (starts, says) in [
+        (&[][..], "first batch starts at None"),
+        (&[1, 5], "first batch starts at Some(1)"),
+        (&[0, 3, 2, 5], "batch 1 starts at 3 and ends at 2"),
+        (&[0, 3], "end at Some(3) of 5"),
+        (&[0, 3, 4, 6], "end at Some(6) of 5"),
+    ] {
+        let error = batches(&sound, starts, moves).unwrap_err();
+        assert!(error.contains(says), "{error}");
     }
 }
 

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use std::time::Instant;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{
-    Aabb, BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Control, Impulse, Manifold, Pair,
-    PoseRecord, QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, body_flags,
+    Aabb, BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Control, FoundManifold, Impulse, Manifold,
+    Pair, PoseRecord, QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, body_flags,
 };
 use tumble_core::limits;
 use tumble_core::{Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
@@ -42,7 +42,11 @@ struct Kept {
     batch_of_slot: Vec<u32>,
     /// Four a slot.
     impulses: Vec<Impulse>,
+    /// By slot.
+    found: Vec<FoundManifold>,
     poses: Vec<PoseRecord>,
+    /// The solver's rows, kept for their room alone.
+    rows: Rows,
 }
 
 /// What the plan phase of a step finds; nothing of it lasts unless the step commits.
@@ -102,6 +106,8 @@ impl World {
             free: Vec::new(),
             batch_of_slot: Vec::new(),
             impulses: Vec::new(),
+            found: Vec::new(),
+            rows: Rows::default(),
         };
         kept.reserve_pairs(limits::initial_pairs(&params.capacities, kept.colliders.len() as u32));
         Ok(Self {
@@ -249,6 +255,7 @@ impl Kept {
         free.append(&mut self.free);
         self.free = free;
         self.batch_of_slot.resize(capacity as usize, UNBATCHED);
+        self.found.resize(capacity as usize, FoundManifold::zeroed());
         let none = Impulse { normal: 0.0, tangent: [0.0; 2], feature: NO_FEATURE };
         self.impulses.resize(4 * capacity as usize, none);
     }
@@ -304,7 +311,7 @@ impl Kept {
             .with_min_len(64)
             .map(|(i, pair)| match i as u32 == step.drop_pair {
                 true => narrowphase::EMPTY,
-                false => narrowphase::collide(pair, &self.colliders, &states, step),
+                false => narrowphase::collide(pair, &self.colliders, &states, &self.found[pair.slot as usize], step),
             })
             .collect();
         control.processed = control.pair_count - u32::from(step.drop_pair < control.pair_count);
@@ -365,20 +372,34 @@ impl Kept {
             .with_min_len(512)
             .map(|i| prepare::prepare_body(&states[i], &self.props[i], batches.masks[i]))
             .collect();
-        let mut rows = self.prepare(&batches, &matched, &manifolds, &states, &bodies, step);
+        self.rows.build(&batches.start, |c| {
+            let index = batches.order[c] as usize;
+            let pair = &matched.pairs[index];
+            let stored = &self.impulses[4 * pair.slot as usize..][..4];
+            let contact = prepare::Contact { pair, manifold: &manifolds[index], stored };
+            prepare::prepare_constraint(&contact, &self.colliders, &bodies, step)
+        });
         watch.lap("prepare");
-        solver::solve(&mut rows, &batches.start, &mut bodies, &states, &self.props, step, restitution);
+        let moving = solver::Bodies { solver: &mut bodies, states: &states, props: &self.props };
+        solver::solve(&mut self.rows, moving, step, restitution);
         watch.lap("solver");
         contact::commit_free(&mut self.free, &matched);
         for (i, pair) in matched.pairs.iter().enumerate() {
             let slot = pair.slot as usize;
             let impulses = &mut self.impulses[4 * slot..4 * slot + 4];
+            if manifolds[i].recycled == 0 {
+                let body = |collider: u32| states[self.colliders[collider as usize].body as usize].rotation;
+                self.found[slot] =
+                    FoundManifold { rotation_a: body(pair.a), rotation_b: body(pair.b), manifold: manifolds[i] };
+            }
             contact::commit_pair(&manifolds[i], batches.of_pair[i], &mut self.batch_of_slot[slot], impulses);
         }
-        for (head, impulses) in rows.heads.iter().zip(rows.impulses.chunks_exact(4)) {
-            let slot = head.slot as usize;
-            store::store(head, impulses, &mut self.impulses[4 * slot..4 * slot + 4]);
-        }
+        let impulses = &mut self.impulses;
+        self.rows.for_each_impulse(|c, point, normal, tangent| {
+            let index = batches.order[c] as usize;
+            let slot = matched.pairs[index].slot as usize;
+            impulses[4 * slot + point] = store::store(&manifolds[index], point, normal, tangent);
+        });
         let committed: Vec<_> =
             bodies.par_iter().zip(&states).with_min_len(512).map(|(b, s)| motion::commit(b, s)).collect();
         for (slot, (_, bad)) in committed.iter().enumerate() {
@@ -398,34 +419,6 @@ impl Kept {
         control.free_count = self.free.len() as u32;
         self.control = control;
         watch.lap("motion");
-    }
-
-    fn prepare(
-        &self,
-        batches: &Batches,
-        matched: &Matched,
-        manifolds: &[Manifold],
-        states: &[BodyState],
-        bodies: &[SolverBody],
-        step: &StepParams,
-    ) -> Rows {
-        let count = batches.order.len();
-        let mut rows = Rows {
-            heads: vec![ConstraintHead::zeroed(); count],
-            points: vec![ConstraintPoint::zeroed(); 4 * count],
-            impulses: vec![Impulse::zeroed(); 4 * count],
-        };
-        let each = rows
-            .heads
-            .par_iter_mut()
-            .zip(rows.points.par_chunks_exact_mut(4).zip(rows.impulses.par_chunks_exact_mut(4)));
-        each.zip(&batches.order).with_min_len(128).for_each(|((head, (points, impulses)), &pair)| {
-            let p = &matched.pairs[pair as usize];
-            let stored = &self.impulses[4 * p.slot as usize..4 * p.slot as usize + 4];
-            let contact = prepare::Contact { pair: p, manifold: &manifolds[pair as usize], stored };
-            *head = prepare::prepare_constraint(&contact, &self.colliders, states, bodies, step, points, impulses);
-        });
-        rows
     }
 }
 

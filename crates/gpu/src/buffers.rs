@@ -50,9 +50,7 @@ impl Buffers {
         let capacity = capacity.max(1);
         let usages = usages | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
         let buffer = gpu.create_buffer(name, element_bytes.saturating_mul(capacity), usages)?;
-        self.generation = NEXT_GENERATION.fetch_add(1, Ordering::Relaxed);
-        let generation = self.generation;
-        self.named.insert(name, Named { buffer, element_bytes, capacity, usages, generation });
+        self.insert(name, Named { buffer, element_bytes, capacity, usages, generation: 0 });
         Ok(())
     }
 
@@ -73,16 +71,21 @@ impl Buffers {
             return Err(Error::Capacity { buffer: name, needed: capacity, capacity: most });
         }
         let (old_buffer, element_bytes, usages) = (old.buffer.clone(), old.element_bytes, old.usages);
-        self.create(gpu, name, element_bytes, capacity, usages)?;
+        let buffer = gpu.create_buffer(name, element_bytes * capacity, usages)?;
         if keep {
-            let buffer = self.buffer(name)?;
             gpu.scoped(&format!("copy of buffer `{name}`"), || {
                 let mut encoder = gpu.device.create_command_encoder(&Default::default());
-                encoder.copy_buffer_to_buffer(&old_buffer, 0, buffer, 0, old_buffer.size());
+                encoder.copy_buffer_to_buffer(&old_buffer, 0, &buffer, 0, old_buffer.size());
                 gpu.queue.submit([encoder.finish()]);
             })?;
         }
+        self.insert(name, Named { buffer, element_bytes, capacity, usages, generation: 0 });
         Ok(())
+    }
+
+    fn insert(&mut self, name: &'static str, named: Named) {
+        self.generation = NEXT_GENERATION.fetch_add(1, Ordering::Relaxed);
+        self.named.insert(name, Named { generation: self.generation, ..named });
     }
 
     fn get(&self, name: &str) -> Result<&Named> {

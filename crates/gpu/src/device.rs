@@ -144,9 +144,7 @@ impl Gpu {
         let descriptor = wgpu::BufferDescriptor { label: Some(name), size, usage, mapped_at_creation: false };
         let (buffer, error) = self.caught(|| self.device.create_buffer(&descriptor));
         match error {
-            Some(wgpu::Error::OutOfMemory { .. }) => {
-                Err(Error::OutOfMemory { buffer: name.to_owned(), bytes: size })
-            }
+            Some(wgpu::Error::OutOfMemory { .. }) => Err(Error::OutOfMemory { buffer: name.to_owned(), bytes: size }),
             Some(error) => Err(Error::Gpu { what: format!("buffer `{name}`"), message: error.to_string() }),
             None => self.check_lost().map(|()| buffer),
         }

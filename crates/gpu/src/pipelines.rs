@@ -192,12 +192,12 @@ fn load(gpu: &Gpu, shader: Shader) -> Result<Loaded> {
     Ok(Loaded { shader, module })
 }
 
-/// Builds one pass of a shader that is in no table, for tests and for users' own passes.
+/// Builds one pass of a shader that is in no table, with this order of invocations (see [`Pipelines::permuted`]).
 ///
 /// # Errors
 /// As for [`Pipelines::pass`].
-pub fn build_pass(gpu: &Gpu, shader: Shader, entry: &str) -> Result<Pass> {
-    build(gpu, &load(gpu, shader)?, entry, 0)
+pub fn build_pass(gpu: &Gpu, shader: Shader, entry: &str, permute: u32) -> Result<Pass> {
+    build(gpu, &load(gpu, shader)?, entry, permute)
 }
 
 fn build(gpu: &Gpu, Loaded { shader, module }: &Loaded, entry: &str, permute: u32) -> Result<Pass> {

@@ -73,8 +73,8 @@ pub struct BodyProps {
     pub pad_c: u32,
 }
 
-/// Hot state of a body within one step; built by `solver/prepare`, thrown away after the commit. 96 bytes.
-#[repr(C)]
+/// Hot state of a body within one step; built by `solver/prepare`, thrown away after the commit. 96 bytes, at multiples of 16.
+#[repr(C, align(16))]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct SolverBody {
     /// m/s.

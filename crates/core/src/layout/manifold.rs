@@ -49,7 +49,7 @@ pub struct ManifoldPoint {
     pub separation: f32,
 }
 
-/// Contact of one pair in one step, as the narrow phase leaves it. 96 bytes.
+/// Contact of one pair in one step, as the narrow phase leaves it. 112 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Manifold {
@@ -59,6 +59,22 @@ pub struct Manifold {
     pub count: u32,
     /// Which features meet at each point; equal from step to step while they do.
     pub features: [u32; 4],
+    /// From the centre of mass of the first body to that of the second when the points were found, world axes, m.
+    pub between: [f32; 3],
+    /// 1 when the points are those of an earlier step.
+    pub recycled: u32,
     /// The points.
     pub points: [ManifoldPoint; 4],
+}
+
+/// A manifold as it was found, with what is needed to tell how far the two have moved since. 144 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct FoundManifold {
+    /// Rotation of the first body's principal frame then.
+    pub rotation_a: [f32; 4],
+    /// Rotation of the second body's.
+    pub rotation_b: [f32; 4],
+    /// The manifold, with the separations of then.
+    pub manifold: Manifold,
 }

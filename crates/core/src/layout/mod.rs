@@ -16,5 +16,5 @@ pub use collider::{Aabb, Collider, aabb_body, shape_kind};
 pub use constraint::{ConstraintHead, ConstraintPoint, Impulse};
 pub use control::{BATCHES, Control, LAST_BATCH, QUARANTINE_NAMES, UNBATCHED, overflow};
 pub use edit::{EditRange, EditRecord, edit_op};
-pub use manifold::{Manifold, ManifoldPoint, NO_SLOT, Pair, pair_kind};
+pub use manifold::{FoundManifold, Manifold, ManifoldPoint, NO_SLOT, Pair, pair_kind};
 pub use step::StepParams;

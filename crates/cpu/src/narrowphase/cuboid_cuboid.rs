@@ -78,10 +78,12 @@ pub fn collide(couple: &Couple) -> Manifold {
     outward[reference.axis] = reference.side;
     let outward = rotate(frame, outward);
     let normal = if on_a { outward } else { -outward };
+    // Points that may come to touch while the manifold is recycled.
+    let spare = couple.recycle_distance();
     let mut points = Candidates::default();
     clip_faces(&reference, |local, separation, feature| {
         let point = origin + rotate(frame, local) - outward * (0.5 * separation);
-        if separation <= couple.reach(point, normal) {
+        if separation <= couple.reach(point, normal) + spare {
             points.push(point, separation, feature + FACE * 8 * axis.index as u32);
         }
     });

@@ -17,13 +17,15 @@ pub fn collide(couple: &Couple, swapped: bool) -> Manifold {
     if normal.dot(cuboid.position - plane.position) - down > couple.farthest() {
         return EMPTY;
     }
+    // Points that may come to touch while the manifold is recycled.
+    let spare = couple.recycle_distance();
     let mut corners = Candidates::default();
     for corner in 0..8 {
         let sign = Vec3::new(side(corner, 0), side(corner, 1), side(corner, 2));
         let at = cuboid.position + rotate(cuboid.rotation, sign * cuboid.size);
         let separation = normal.dot(at - plane.position);
         let point = at - normal * (0.5 * separation);
-        if separation <= couple.reach(point, normal) {
+        if separation <= couple.reach(point, normal) + spare {
             corners.push(point, separation, corner);
         }
     }

@@ -10,10 +10,13 @@ pub mod ball_halfspace;
 mod clip;
 pub mod cuboid_cuboid;
 pub mod cuboid_halfspace;
+pub mod recycle;
 
 use crate::math::{quat, rotate, vec3};
 use glam::{Quat, Vec3};
-use tumble_core::layout::{BodyState, Collider, Manifold, ManifoldPoint, Pair, StepParams, pair_kind, shape_kind};
+use tumble_core::layout::{
+    BodyState, Collider, FoundManifold, Manifold, ManifoldPoint, Pair, StepParams, pair_kind, shape_kind,
+};
 
 /// A collider where it is, relative to the centre of mass of the pair's first body.
 #[derive(Debug, Clone, Copy)]
@@ -30,6 +33,8 @@ pub struct Placed {
     pub linear: Vec3,
     /// rad/s.
     pub angular: Vec3,
+    /// Rotation of its body's principal frame.
+    pub body_rotation: Quat,
 }
 
 /// Two placed colliders and how far ahead to look.
@@ -50,6 +55,8 @@ pub const EMPTY: Manifold = Manifold {
     normal: [0.0; 3],
     count: 0,
     features: [0; 4],
+    between: [0.0; 3],
+    recycled: 0,
     points: [ManifoldPoint { anchor: [0.0; 3], separation: 0.0 }; 4],
 };
 
@@ -67,30 +74,52 @@ pub fn place(pair: &Pair, colliders: &[Collider], states: &[BodyState], step: &S
             center,
             linear: vec3(s.linear_velocity),
             angular: vec3(s.angular_velocity),
+            body_rotation: rotation,
         }
     };
     let (a, b) = (placed(ca, sa, Vec3::ZERO), placed(cb, sb, between));
     Couple { a, b, distance: step.speculative_distance, dt: step.dt }
 }
 
-/// The manifold of one pair.
-pub fn collide(pair: &Pair, colliders: &[Collider], states: &[BodyState], step: &StepParams) -> Manifold {
+/// The manifold of one pair; `found` is what its slot remembers.
+pub fn collide(
+    pair: &Pair,
+    colliders: &[Collider],
+    states: &[BodyState],
+    found: &FoundManifold,
+    step: &StepParams,
+) -> Manifold {
     let couple = place(pair, colliders, states, step);
+    let kind = pair.kind & pair_kind::MASK;
+    let boxes = kind == pair_kind::CUBOID_CUBOID || kind == pair_kind::CUBOID_HALFSPACE;
+    if boxes && pair.kind & pair_kind::FRESH == 0 {
+        if let Some(manifold) = recycle::recycle(&couple, found) {
+            return manifold;
+        }
+    }
     let swapped = colliders[pair.a as usize].shape > colliders[pair.b as usize].shape;
-    match pair.kind & pair_kind::MASK {
+    let mut manifold = match kind {
         pair_kind::BALL_BALL => ball_ball::collide(&couple),
         pair_kind::BALL_CUBOID => ball_cuboid::collide(&couple, swapped),
         pair_kind::CUBOID_CUBOID => cuboid_cuboid::collide(&couple),
         pair_kind::BALL_HALFSPACE => ball_halfspace::collide(&couple, swapped),
         pair_kind::CUBOID_HALFSPACE => cuboid_halfspace::collide(&couple, swapped),
         _ => EMPTY,
-    }
+    };
+    manifold.between = couple.b.center.to_array();
+    manifold
 }
 
 impl Couple {
     /// The same two with their roles exchanged.
     pub fn swap(&self) -> Self {
         Self { a: self.b, b: self.a, ..*self }
+    }
+
+    /// How far the two may move against each other before their contact is found anew, m.
+    pub fn recycle_distance(&self) -> f32 {
+        let smallest = |p: &Placed| if p.size.x > 0.0 { p.size.min_element() } else { f32::MAX };
+        recycle::SHARE * smallest(&self.a).min(smallest(&self.b))
     }
 
     /// How far apart the two may be at a point and still need a contact in this step.

@@ -1,25 +1,44 @@
-//! Stage `solver`: rows (`prepare`), the law of one visit (`soft`), the passes over batches (here), and the way back
-//! to the store (`store`). Twin of `shaders/solver/`.
+//! Stage `solver`: rows (`prepare`), the law of one visit (`soft`; four at a time in `soft_lanes`), the passes over
+//! batches (here), and the way back to the store (`store`). Twin of `shaders/solver/`.
 //!
 //! Soft sub-stepping, the shape that Box2D 3, Box3D and rapier converged on (Catto, "Solver2D", 2024; Macklin et al.,
 //! "Small Steps in Physics Simulation", SCA 2019): contacts are found once a step, and in each sub-step velocities
 //! are integrated, impulses of the last sub-step applied, contacts solved as damped springs, positions integrated, and
 //! contacts solved again as rigid, which takes out the velocity that the springs put in. Bounces come last.
 
+mod lanes;
 pub mod prepare;
 pub mod soft;
+mod soft_lanes;
 pub mod store;
 
 use crate::motion;
 use crate::shared::Shared;
+use lanes::{BodyLanes, ConstraintLanes, LANES};
 use rayon::prelude::*;
 use tumble_core::layout::{
     BodyProps, BodyState, ConstraintHead, ConstraintPoint, Impulse, LAST_BATCH, SolverBody, StepParams,
 };
+use wide::f32x4;
 
-/// The constraints of a step in batch order; points and impulses are four a constraint.
-#[derive(Debug, Default)]
+/// The constraints of a step. Batches lie in groups of four side by side, the last one in plain rows.
+#[derive(Default)]
 pub struct Rows {
+    /// Groups, batch by batch; a batch's last group may have empty lanes.
+    groups: Vec<ConstraintLanes>,
+    /// First group of each batch but the last, and the end.
+    group_start: Vec<usize>,
+    /// First constraint of each group, and how many it has.
+    members: Vec<(u32, u32)>,
+    /// The last batch.
+    last: PlainRows,
+    /// First constraint of the last batch.
+    last_first: usize,
+}
+
+/// Constraints in plain rows; points and impulses are four a constraint.
+#[derive(Debug, Default, Clone)]
+pub struct PlainRows {
     /// One a constraint.
     pub heads: Vec<ConstraintHead>,
     /// Four a constraint.
@@ -27,6 +46,9 @@ pub struct Rows {
     /// Four a constraint.
     pub impulses: Vec<Impulse>,
 }
+
+/// One constraint in plain form.
+pub type PlainConstraint = (ConstraintHead, [ConstraintPoint; 4], [Impulse; 4]);
 
 /// What a visit to a constraint does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,64 +63,135 @@ pub enum Visit {
     Restitution,
 }
 
-/// Runs all sub-steps. `start` holds the batches' first constraints.
-pub fn solve(
-    rows: &mut Rows,
-    start: &[u32],
-    bodies: &mut [SolverBody],
-    states: &[BodyState],
-    props: &[BodyProps],
-    step: &StepParams,
-    restitution: bool,
-) {
-    for _ in 0..step.substeps {
-        bodies.par_iter_mut().zip(states.par_iter().zip(props)).with_min_len(512).for_each(|(body, (state, props))| {
-            motion::integrate_velocity(body, state, props, step);
+/// Bodies of a step, by slot.
+pub struct Bodies<'a> {
+    /// Hot state, which the solver moves.
+    pub solver: &'a mut [SolverBody],
+    /// State at the start of the step.
+    pub states: &'a [BodyState],
+    /// Properties.
+    pub props: &'a [BodyProps],
+}
+
+impl Rows {
+    /// Builds the rows of all constraints; `make(c)` gives constraint c of `start`'s order. Buffers are used again.
+    pub fn build(&mut self, start: &[u32], make: impl Fn(usize) -> PlainConstraint + Sync) {
+        self.group_start.clear();
+        self.members.clear();
+        for batch in 0..LAST_BATCH as usize {
+            self.group_start.push(self.members.len());
+            for first in (start[batch]..start[batch + 1]).step_by(LANES) {
+                self.members.push((first, (start[batch + 1] - first).min(LANES as u32)));
+            }
+        }
+        self.group_start.push(self.members.len());
+        self.groups.resize(self.members.len(), ConstraintLanes::empty());
+        self.groups.par_iter_mut().zip(&self.members).with_min_len(32).for_each(|(group, &(first, count))| {
+            *group = ConstraintLanes::empty();
+            for lane in 0..count as usize {
+                let (head, points, impulses) = make(first as usize + lane);
+                group.fill(lane, &head, &points, &impulses);
+            }
         });
-        sweep(rows, start, bodies, step, Visit::WarmStart);
-        sweep(rows, start, bodies, step, Visit::Solve);
-        bodies.par_iter_mut().zip(states.par_iter().zip(props)).with_min_len(512).for_each(|(body, (state, props))| {
-            motion::integrate_position(body, state, props, step);
-        });
-        sweep(rows, start, bodies, step, Visit::Relax);
+        let last = start[LAST_BATCH as usize] as usize..start[LAST_BATCH as usize + 1] as usize;
+        self.last_first = last.start;
+        self.last = PlainRows::build(last, make);
     }
-    if restitution {
-        sweep(rows, start, bodies, step, Visit::Restitution);
+
+    /// Calls `take(c, point, normal, tangent)` with the impulse of every point, used or not.
+    pub fn for_each_impulse(&self, mut take: impl FnMut(usize, usize, f32, [f32; 2])) {
+        for (group, &(first, count)) in self.groups.iter().zip(&self.members) {
+            for lane in 0..count as usize {
+                for point in 0..4 {
+                    let (normal, tangent) = group.impulse(lane, point);
+                    take(first as usize + lane, point, normal, tangent);
+                }
+            }
+        }
+        for (i, impulse) in self.last.impulses.iter().enumerate() {
+            take(self.last_first + i / 4, i % 4, impulse.normal, impulse.tangent);
+        }
+    }
+
+    fn sweep(&mut self, bodies: &mut [SolverBody], step: &StepParams, visit: Visit) {
+        for batch in 0..LAST_BATCH as usize {
+            let groups = &mut self.groups[self.group_start[batch]..self.group_start[batch + 1]];
+            if groups.is_empty() {
+                continue;
+            }
+            let shared = Shared::new(bytemuck::cast_slice_mut::<SolverBody, f32x4>(bodies));
+            let moved = matches!(visit, Visit::Solve | Visit::Relax);
+            groups.par_iter_mut().with_min_len(64).for_each(|group| {
+                // SAFETY: constraints of one batch share no moving body (`batch`), and bodies that do not move are
+                // never written (`scatter`).
+                let mut a = unsafe { BodyLanes::gather(&shared, group.body_a, moved) };
+                // SAFETY: as above.
+                let mut b = unsafe { BodyLanes::gather(&shared, group.body_b, moved) };
+                soft_lanes::visit(visit, group, &mut a, &mut b, step);
+                // SAFETY: as above.
+                unsafe { a.scatter(&shared, group.body_a) };
+                // SAFETY: as above.
+                unsafe { b.scatter(&shared, group.body_b) };
+            });
+        }
+        self.last.sweep(bodies, step, visit);
     }
 }
 
-/// One visit to every constraint, batch by batch; the last batch in sequence.
-pub fn sweep(rows: &mut Rows, start: &[u32], bodies: &mut [SolverBody], step: &StepParams, visit: Visit) {
-    for batch in 0..=LAST_BATCH as usize {
-        let range = start[batch] as usize..start[batch + 1] as usize;
-        if range.is_empty() {
-            continue;
+impl PlainRows {
+    /// Builds constraints `range` of `make`.
+    pub fn build(range: std::ops::Range<usize>, make: impl Fn(usize) -> PlainConstraint) -> Self {
+        let mut rows = Self::default();
+        for c in range {
+            let (head, points, impulses) = make(c);
+            rows.heads.push(head);
+            rows.points.extend(points);
+            rows.impulses.extend(impulses);
         }
-        let heads = &rows.heads[range.clone()];
-        let points = &mut rows.points[4 * range.start..4 * range.end];
-        let impulses = &mut rows.impulses[4 * range.start..4 * range.end];
-        let bodies = Shared::new(bodies);
-        let one = |(head, (points, impulses)): (&ConstraintHead, (&mut [ConstraintPoint], &mut [Impulse]))| {
-            // SAFETY: constraints of one batch share no moving body (`batch`), the last batch runs on one thread,
-            // and bodies that do not move are never written.
-            let mut a = unsafe { bodies.get(head.body_a as usize) };
-            // SAFETY: as above.
-            let mut b = unsafe { bodies.get(head.body_b as usize) };
+        rows
+    }
+
+    /// One visit to every constraint, in order. Within a batch the order is of no account.
+    pub fn sweep(&mut self, bodies: &mut [SolverBody], step: &StepParams, visit: Visit) {
+        let points = self.points.chunks_exact_mut(4);
+        for (head, (points, impulses)) in self.heads.iter().zip(points.zip(self.impulses.chunks_exact_mut(4))) {
+            let (ia, ib) = (head.body_a as usize, head.body_b as usize);
+            let (mut a, mut b) = (bodies[ia], bodies[ib]);
             soft::visit(visit, head, points, impulses, &mut a, &mut b, step);
             if a.inverse_mass > 0.0 {
-                // SAFETY: as above.
-                unsafe { bodies.set(head.body_a as usize, a) };
+                bodies[ia] = a;
             }
             if b.inverse_mass > 0.0 {
-                // SAFETY: as above.
-                unsafe { bodies.set(head.body_b as usize, b) };
+                bodies[ib] = b;
             }
-        };
-        if batch == LAST_BATCH as usize {
-            heads.iter().zip(points.chunks_exact_mut(4).zip(impulses.chunks_exact_mut(4))).for_each(one);
-        } else {
-            let points = points.par_chunks_exact_mut(4);
-            heads.par_iter().zip(points.zip(impulses.par_chunks_exact_mut(4))).with_min_len(128).for_each(one);
         }
+    }
+}
+
+/// Runs all sub-steps.
+pub fn solve(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, restitution: bool) {
+    substeps(bodies, step, restitution, |bodies, visit| rows.sweep(bodies, step, visit));
+}
+
+/// The same in plain rows, one constraint after the other: what `solve` is tested against.
+pub fn solve_plain(rows: &mut PlainRows, bodies: Bodies<'_>, step: &StepParams, restitution: bool) {
+    substeps(bodies, step, restitution, |bodies, visit| rows.sweep(bodies, step, visit));
+}
+
+fn substeps(bodies: Bodies<'_>, step: &StepParams, restitution: bool, mut sweep: impl FnMut(&mut [SolverBody], Visit)) {
+    let Bodies { solver, states, props } = bodies;
+    for _ in 0..step.substeps {
+        solver.par_iter_mut().zip(states.par_iter().zip(props)).with_min_len(512).for_each(|(body, (state, props))| {
+            motion::integrate_velocity(body, state, props, step);
+        });
+        sweep(solver, Visit::WarmStart);
+        sweep(solver, Visit::Solve);
+        solver.par_iter_mut().zip(states.par_iter().zip(props)).with_min_len(512).for_each(|(body, (state, props))| {
+            motion::integrate_position(body, state, props, step);
+        });
+        sweep(solver, Visit::Relax);
+    }
+    if restitution {
+        sweep(solver, Visit::Restitution);
     }
 }

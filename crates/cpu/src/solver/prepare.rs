@@ -1,7 +1,10 @@
 //! Builds the step's solver bodies and constraint rows. Twin of `shaders/solver/prepare.wgsl`.
 
+use super::PlainConstraint;
 use crate::bounds::moves;
+use crate::contact::NO_FEATURE;
 use crate::math::{inverse_inertia_times, quat, tangents, vec3};
+use bytemuck::Zeroable;
 use glam::{Mat3, Vec3};
 use tumble_core::layout::{
     BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Impulse, Manifold, Pair, SolverBody, StepParams,
@@ -53,18 +56,17 @@ pub struct Contact<'a> {
 pub fn prepare_constraint(
     contact: &Contact<'_>,
     colliders: &[Collider],
-    states: &[BodyState],
     bodies: &[SolverBody],
     step: &StepParams,
-    points: &mut [ConstraintPoint],
-    impulses: &mut [Impulse],
-) -> ConstraintHead {
+) -> PlainConstraint {
+    let mut points = [ConstraintPoint::zeroed(); 4];
+    let mut impulses = [Impulse { normal: 0.0, tangent: [0.0; 2], feature: NO_FEATURE }; 4];
     let (pair, manifold) = (contact.pair, contact.manifold);
     let (ca, cb) = (&colliders[pair.a as usize], &colliders[pair.b as usize]);
     let (a, b) = (&bodies[ca.body as usize], &bodies[cb.body as usize]);
     let normal = vec3(manifold.normal);
     let (t1, t2) = tangents(normal);
-    let between = vec3(states[cb.body as usize].position) - vec3(states[ca.body as usize].position);
+    let between = vec3(manifold.between);
     let fresh = pair.kind & pair_kind::FRESH != 0;
     for i in 0..manifold.count as usize {
         let ra = vec3(manifold.points[i].anchor);
@@ -98,7 +100,7 @@ pub fn prepare_constraint(
     } else {
         (step.static_bias_rate, step.static_mass_scale, step.static_impulse_scale)
     };
-    ConstraintHead {
+    let head = ConstraintHead {
         normal: manifold.normal,
         friction: combined(ca.combine & 3, cb.combine & 3, ca.friction, cb.friction),
         body_a: ca.body,
@@ -109,7 +111,8 @@ pub fn prepare_constraint(
         bias_rate,
         mass_scale,
         impulse_scale,
-    }
+    };
+    (head, points, impulses)
 }
 
 /// Coefficient of two colliders by the stronger of their rules (`CombineRule`).

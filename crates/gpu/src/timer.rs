@@ -1,0 +1,109 @@
+//! Time of each stage, measured on the device.
+
+use std::collections::VecDeque;
+
+use tumble_core::{Result, StageTime};
+use wgpu::{BufferUsages, CommandEncoder, QuerySet, SubmissionIndex};
+
+use crate::device::Gpu;
+use crate::readback::Readback;
+
+/// Stages of one submission that can be timed; later ones are not.
+const MOST_STAGES: u32 = 1024;
+/// Submissions whose times are on their way at once; one more is not timed.
+const IN_FLIGHT: usize = 4;
+
+/// Times the stages of submissions, each between two timestamps around a compute pass of its own.
+#[derive(Debug)]
+pub struct Timer {
+    queries: QuerySet,
+    resolved: wgpu::Buffer,
+    readback: Readback,
+    nanoseconds_per_tick: f64,
+    running: Vec<&'static str>,
+    flying: VecDeque<Vec<&'static str>>,
+}
+
+impl Timer {
+    /// A timer, or `None` when the device has no timestamps.
+    ///
+    /// # Errors
+    /// As for [`Gpu::create_buffer`].
+    pub fn new(gpu: &Gpu) -> Result<Option<Self>> {
+        if !gpu.has_timestamps() {
+            return Ok(None);
+        }
+        let count = 2 * MOST_STAGES;
+        let bytes = u64::from(count) * 8;
+        let descriptor = wgpu::QuerySetDescriptor { label: Some("timer"), ty: wgpu::QueryType::Timestamp, count };
+        Ok(Some(Self {
+            queries: gpu.scoped("timestamps", || gpu.device.create_query_set(&descriptor))?,
+            resolved: gpu.create_buffer("timer", bytes, BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC)?,
+            readback: Readback::new(gpu, "timer", bytes, IN_FLIGHT)?,
+            nanoseconds_per_tick: f64::from(gpu.queue.get_timestamp_period()),
+            running: Vec::new(),
+            flying: VecDeque::new(),
+        }))
+    }
+
+    /// Begins a submission; false when too many are in flight for it to be timed.
+    pub(crate) fn start(&mut self) -> bool {
+        self.running.clear();
+        !self.readback.is_full()
+    }
+
+    /// What a compute pass of this stage is to write; `None` when there is no room left.
+    pub(crate) fn stage(&mut self, stage: &'static str) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
+        let first = 2 * self.running.len() as u32;
+        if first >= 2 * MOST_STAGES {
+            return None;
+        }
+        self.running.push(stage);
+        Some(wgpu::ComputePassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: Some(first),
+            end_of_pass_write_index: Some(first + 1),
+        })
+    }
+
+    pub(crate) fn finish(&mut self, encoder: &mut CommandEncoder) {
+        if self.running.is_empty() {
+            return;
+        }
+        encoder.resolve_query_set(&self.queries, 0..2 * self.running.len() as u32, &self.resolved, 0);
+        if self.readback.copy(encoder, &self.resolved, 0) {
+            self.flying.push_back(std::mem::take(&mut self.running));
+        }
+    }
+
+    pub(crate) fn submitted(&mut self, index: &SubmissionIndex) {
+        self.readback.submitted(index);
+    }
+
+    /// Times of the oldest submission that was timed and not yet taken, a stage each in the order of their first
+    /// appearance; `None` when it has not arrived and `wait` is false, or when there is none.
+    ///
+    /// # Errors
+    /// As for [`Readback::try_take`] and [`Readback::wait_take`].
+    pub fn take(&mut self, gpu: &Gpu, wait: bool) -> Result<Option<Vec<StageTime>>> {
+        let bytes = if wait { self.readback.wait_take(gpu) } else { self.readback.try_take(gpu) };
+        let bytes = match bytes {
+            Ok(Some(bytes)) => bytes,
+            Ok(None) => return Ok(None),
+            Err(error) => {
+                self.flying.pop_front();
+                return Err(error);
+            }
+        };
+        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&bytes);
+        let mut times: Vec<StageTime> = Vec::new();
+        for (stage, span) in self.flying.pop_front().unwrap_or_default().into_iter().zip(ticks.chunks_exact(2)) {
+            let spent = span[1].saturating_sub(span[0]) as f64 * self.nanoseconds_per_tick * 1e-6;
+            match times.iter_mut().find(|time| time.stage == stage) {
+                Some(time) => time.milliseconds = time.milliseconds.map(|sum| sum + spent),
+                None => times.push(StageTime { stage, milliseconds: Some(spent) }),
+            }
+        }
+        Ok(Some(times))
+    }
+}

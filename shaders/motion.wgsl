@@ -1,0 +1,215 @@
+// Stage `motion`: bodies move; the step's result becomes the state. Twin of crates/cpu/src/motion.rs. All with one
+// thread a body:
+//
+//   integrate_velocities   velocities in `solver_bodies`, from `work_states` (forces) and `props`
+//   integrate_positions    translation and delta there
+//   commit                 `states` from `solver_bodies` and `work_states`; counts and names bodies in quarantine
+//   write_poses            `poses`, the bodies' own frames for users and renderers, from `states` and `props`
+//
+// Rotation by the implicit midpoint rule with Cayley's map: Simo and Wong, "Unconditionally Stable Algorithms for Rigid
+// Body Dynamics that Exactly Preserve Energy and Momentum" (1991).
+
+//#import shared/body.wgsl
+//#import shared/control.wgsl
+//#import shared/math.wgsl
+//#import shared/step.wgsl
+//#import shared/thread.wgsl
+
+// Largest turn of a body in a sub-step, rad; it bounds the number of pieces of a turn.
+const MAX_TURN: f32 = 32.0;
+// Beyond this a velocity (m/s, rad/s) or position (m) is taken for what it is: an explosion.
+const STATE_LIMIT: f32 = 1e9;
+const COUNTER_FROZEN_COUNT: u32 = 108u; // scratch word of the counters
+
+@group(0) @binding(0) var<uniform> control: Control;
+@group(0) @binding(1) var<uniform> step: StepParams;
+@group(0) @binding(2) var<storage, read> work_states: array<BodyState>;
+@group(0) @binding(3) var<storage, read> props: array<BodyProps>;
+@group(0) @binding(4) var<storage, read_write> solver_bodies: array<SolverBody>;
+@group(0) @binding(5) var<storage, read_write> states: array<BodyState>;
+@group(0) @binding(6) var<storage, read_write> poses: array<PoseRecord>;
+@group(0) @binding(7) var<storage, read_write> counters: array<atomic<u32>>;
+
+// Acceleration by gravity and force, m/s².
+fn acceleration(i: u32) -> vec3<f32> {
+    return step.gravity * props[i].gravity_scale + work_states[i].force * props[i].inverse_mass;
+}
+
+// Gravity, force, torque and damping over one sub-step.
+@compute @workgroup_size(256)
+fn integrate_velocities(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i >= step.body_count || control.stop != 0u || !moves(work_states[i].flags) {
+        return;
+    }
+    let linear = solver_bodies[i].linear_velocity + acceleration(i) * step.h;
+    solver_bodies[i].linear_velocity = linear * (1.0 / (1.0 + step.h * props[i].linear_damping));
+    let turn = symmetric_times(
+        solver_bodies[i].inverse_inertia_diagonal,
+        solver_bodies[i].inverse_inertia_off,
+        work_states[i].torque,
+    );
+    let angular = solver_bodies[i].angular_velocity + turn * step.h;
+    solver_bodies[i].angular_velocity = angular * (1.0 / (1.0 + step.h * props[i].angular_damping));
+}
+
+// Solves I (w1 - w0) + h m x I m = 0, m = (w0 + w1) / 2, for w1.
+fn midpoint(w0: vec3<f32>, inertia: vec3<f32>, h: f32) -> vec3<f32> {
+    var w = w0;
+    for (var newton = 0u; newton < 2u; newton++) {
+        let m = 0.5 * (w + w0);
+        let im = inertia * m;
+        let residual = inertia * (w - w0) + h * cross(m, im);
+        // Jacobian: diag(I) + h/2 ([m] diag(I) - [I m]), column by column.
+        let s = 0.5 * h;
+        let x = vec3<f32>(inertia.x, s * (m.z * inertia.x - im.z), s * (im.y - m.y * inertia.x));
+        let y = vec3<f32>(s * (im.z - m.z * inertia.y), inertia.y, s * (m.x * inertia.y - im.x));
+        let z = vec3<f32>(s * (m.y * inertia.z - im.y), s * (im.x - m.x * inertia.z), inertia.z);
+        let yz = cross(y, z);
+        let solution = vec3<f32>(dot(residual, yz), dot(residual, cross(z, x)), dot(residual, cross(x, y)));
+        w -= solution / dot(x, yz);
+    }
+    return w;
+}
+
+// The rotation (h w / 2, 1), normalised.
+fn cayley(w: vec3<f32>, h: f32) -> vec4<f32> {
+    return unit(vec4<f32>(0.5 * h * w, 1.0));
+}
+
+// The rotation by |w| h about w, where that is no more than one radian. Sine and cosine by their series, good to the last
+// bit or two there: WGSL promises them to 2^-11 only, which would slow a spin by a visible share.
+fn half_turn(w: vec3<f32>, h: f32) -> vec4<f32> {
+    let half = 0.5 * h * w;
+    let s = dot(half, half);
+    let ratio = 1.0 - s * (1.0 / 6.0 - s * (1.0 / 120.0 - s * (1.0 / 5040.0)));
+    let cosine = 1.0 - s * (0.5 - s * (1.0 / 24.0 - s * (1.0 / 720.0 - s * (1.0 / 40320.0))));
+    return vec4<f32>(half * ratio, cosine);
+}
+
+// Rotation over `h`: the implicit midpoint rule for Euler's equation in the body's frame with Cayley's map, two Newton
+// steps, and the change of the angular velocity added as a difference, which keeps rounding out of it. Turns of more than
+// one radian are made in pieces.
+fn turn(i: u32, h: f32) {
+    let inertia = props[i].inertia;
+    let start = work_states[i].rotation;
+    var angular = solver_bodies[i].angular_velocity;
+    var angle = sqrt(dot(angular, angular)) * h;
+    if !is_finite_bits(angle) {
+        return;
+    }
+    if angle > MAX_TURN {
+        angular *= MAX_TURN / angle;
+        angle = MAX_TURN;
+    }
+    let pieces = clamp(ceil(angle), 1.0, MAX_TURN);
+    let piece = h / pieces;
+    var delta = solver_bodies[i].delta;
+    // Kinematic bodies and round ones turn at a constant rate.
+    let largest = max(inertia.x, max(inertia.y, inertia.z));
+    let smallest = min(inertia.x, min(inertia.y, inertia.z));
+    let steady = !moves(work_states[i].flags) || largest - smallest <= 1e-6 * largest;
+    for (var k = 0u; k < u32(pieces); k++) {
+        if steady {
+            delta = unit(multiply(half_turn(angular, piece), delta));
+        } else {
+            let q0 = unit(multiply(delta, start));
+            let w0 = rotate_back(q0, angular);
+            let w1 = midpoint(w0, inertia, piece);
+            let mean = 0.5 * (w0 + w1);
+            let q1 = unit(multiply(q0, cayley(mean, piece)));
+            angular += rotate(q1, w1) - rotate(q0, w0);
+            delta = unit(multiply(q1, conjugate(start)));
+        }
+    }
+    solver_bodies[i].delta = delta;
+    solver_bodies[i].angular_velocity = angular;
+}
+
+// Position and rotation over one sub-step.
+//
+// A body that no constraint touches falls by the mean of its old and new velocity (gravity in two half kicks: exact for
+// a constant force). One that is touched moves by the velocity that its contacts were solved for.
+@compute @workgroup_size(256)
+fn integrate_positions(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i >= step.body_count || control.stop != 0u {
+        return;
+    }
+    let kind = work_states[i].flags & BODY_KIND;
+    if kind == BODY_NONE || kind == BODY_FIXED || (work_states[i].flags & BODY_FROZEN) != 0u {
+        return;
+    }
+    var way = solver_bodies[i].linear_velocity * step.h;
+    if solver_bodies[i].touched == 0u && kind == BODY_DYNAMIC {
+        way -= acceleration(i) * (0.5 * step.h * step.h);
+    }
+    solver_bodies[i].translation = solver_bodies[i].translation + way;
+    turn(i, step.h);
+}
+
+fn small(v: vec3<f32>) -> bool {
+    return is_finite3(v) && max(abs(v.x), max(abs(v.y), abs(v.z))) <= STATE_LIMIT;
+}
+
+// The state after the step. A result that is not finite is thrown away: the body keeps its pose and is put in
+// quarantine.
+@compute @workgroup_size(256)
+fn commit(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i >= step.body_count || atomicLoad(&counters[CONTROL_STOP]) != 0u {
+        return;
+    }
+    var state = work_states[i];
+    state.force = vec3<f32>();
+    state.torque = vec3<f32>();
+    if (state.flags & BODY_KIND) != BODY_NONE && (state.flags & BODY_FROZEN) == 0u {
+        let body = solver_bodies[i];
+        let position = state.position + body.translation;
+        let good = small(position) && small(body.linear_velocity) && small(body.angular_velocity)
+            && is_finite4(body.delta);
+        if good {
+            state.position = position;
+            state.rotation = unit(multiply(body.delta, state.rotation));
+            state.linear_velocity = body.linear_velocity;
+            state.angular_velocity = body.angular_velocity;
+        } else {
+            state.flags |= BODY_FROZEN;
+            state.linear_velocity = vec3<f32>();
+            state.angular_velocity = vec3<f32>();
+            atomicMax(&counters[CONTROL_QUARANTINED + i % QUARANTINE_NAMES], i + 1u);
+        }
+    }
+    if (state.flags & BODY_KIND) != BODY_NONE && (state.flags & BODY_FROZEN) != 0u {
+        atomicAdd(&counters[COUNTER_FROZEN_COUNT], 1u);
+    }
+    states[i] = state;
+}
+
+// The body's own frame.
+@compute @workgroup_size(256)
+fn write_poses(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i >= step.body_count || control.stop != 0u {
+        return;
+    }
+    let rotation = unit(multiply(states[i].rotation, conjugate(props[i].frame)));
+    let translation = states[i].position - rotate(rotation, props[i].center_of_mass);
+    poses[i] = PoseRecord(translation, states[i].flags, rotation);
+}

@@ -1,0 +1,205 @@
+// The sweeps over constraints, batch by batch; the law of a visit is in `solver/soft`.
+// Twin of crates/cpu/src/solver/mod.rs (`PlainRows::sweep`).
+//
+// Reads `heads`; reads and writes `points`, `impulses` and the velocities in `solver_bodies`. Constraints of one batch
+// share no moving body, so each has a thread of its own:
+//
+//   warm_start, solve, relax, restitution   one batch a dispatch (`batch`), one thread a constraint
+//   ..._tail                                one workgroup: the batches from `step.wide_batches` on, one after the
+//                                           other, one thread each 256th constraint; the last batch, whose constraints do
+//                                           share bodies, in order: each thread has 128 of them and waits for its turn
+//
+// Harada, "Parallelizing the Physics Pipeline" (GDC 2009). Loops take at most 9 turns for each 256 constraints of the
+// tail, and 11 for each 8 of the last batch.
+
+//#import shared/control.wgsl
+//#import shared/thread.wgsl
+//#import solver/soft.wgsl
+
+struct BatchIndex {
+    index: u32,
+    pad_a: u32,
+    pad_b: u32,
+    pad_c: u32,
+}
+
+@group(0) @binding(0) var<uniform> control: Control;
+@group(0) @binding(1) var<uniform> step: StepParams;
+@group(0) @binding(2) var<uniform> batch: BatchIndex;
+@group(0) @binding(3) var<storage, read> heads: array<ConstraintHead>;
+@group(0) @binding(4) var<storage, read_write> points: array<ConstraintPoint>;
+@group(0) @binding(5) var<storage, read_write> impulses: array<Impulse>;
+@group(0) @binding(6) var<storage, read_write> solver_bodies: array<SolverBody>;
+
+const SOLVER_WORKGROUP: u32 = 64u;
+const TURN: u32 = 128u; // constraints of the last batch that one thread visits in a row
+
+fn start_of(index: u32) -> u32 {
+    return control.batch_start[index / 4u][index % 4u];
+}
+
+// One visit to constraint c: normals first, then friction within the cone that they allow. Only the velocities of
+// bodies that move are written. (A constraint has a point at least; a loop that tests at its end saves llvmpipe one
+// turn with no lane active.)
+fn visit(kind: u32, c: u32) {
+    let head = heads[c];
+    var a = solver_bodies[head.body_a];
+    var b = solver_bodies[head.body_b];
+    let t = tangents(head.normal);
+    let first = 4u * c;
+    let end = first + min(head.count, 4u);
+    var p = first;
+    loop {
+        var point = points[p];
+        var impulse = impulses[p];
+        if kind == WARM_START {
+            warm_start_point(head.normal, t, &point, &impulse, &a, &b);
+        } else if kind == RESTITUTION {
+            bounce(head.restitution, head.normal, &point, &impulse, &a, &b, step);
+            impulses[p].normal = impulse.normal;
+        } else {
+            push_normal(kind, head, &point, &impulse, &a, &b, step);
+            impulses[p].normal = impulse.normal;
+            points[p].max_impulse = point.max_impulse;
+            if kind == RELAX {
+                points[p].approach = point.approach;
+            }
+        }
+        continuing {
+            p++;
+            break if p >= end;
+        }
+    }
+    if kind == SOLVE || kind == RELAX {
+        p = first;
+        loop {
+            var point = points[p];
+            var impulse = impulses[p];
+            push_tangent(head.friction, t, &point, &impulse, &a, &b);
+            impulses[p].tangent = impulse.tangent;
+            continuing {
+                p++;
+                break if p >= end;
+            }
+        }
+    }
+    if a.inverse_mass > 0.0 {
+        solver_bodies[head.body_a].linear_velocity = a.linear_velocity;
+        solver_bodies[head.body_a].angular_velocity = a.angular_velocity;
+    }
+    if b.inverse_mass > 0.0 {
+        solver_bodies[head.body_b].linear_velocity = b.linear_velocity;
+        solver_bodies[head.body_b].angular_velocity = b.angular_velocity;
+    }
+}
+
+// Constraint of an invocation of the batch's dispatch, or NONE. Workgroups are smaller here than `invocation` takes them
+// to be.
+const NONE: u32 = 0xffffffffu;
+
+fn constraint_of(wg: vec3<u32>, num: vec3<u32>, lid: u32) -> u32 {
+    var local = lid;
+    if PERMUTE == 1u {
+        local = SOLVER_WORKGROUP - 1u - lid;
+    } else if PERMUTE == 2u {
+        local = reverseBits(lid) >> 26u;
+    }
+    let c = start_of(batch.index) + workgroup_index(wg, num) * SOLVER_WORKGROUP + local;
+    return select(NONE, c, c < start_of(batch.index + 1u) && control.stop == 0u);
+}
+
+@compute @workgroup_size(64)
+fn warm_start(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let c = constraint_of(wg, num, lid);
+    if c != NONE {
+        visit(WARM_START, c);
+    }
+}
+
+@compute @workgroup_size(64)
+fn solve(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let c = constraint_of(wg, num, lid);
+    if c != NONE {
+        visit(SOLVE, c);
+    }
+}
+
+@compute @workgroup_size(64)
+fn relax(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let c = constraint_of(wg, num, lid);
+    if c != NONE {
+        visit(RELAX, c);
+    }
+}
+
+@compute @workgroup_size(64)
+fn restitution(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let c = constraint_of(wg, num, lid);
+    if c != NONE {
+        visit(RESTITUTION, c);
+    }
+}
+
+// The batches from `wide_batches` on. What a batch wrote, the barrier shows to the next one: they share a workgroup.
+fn tail(kind: u32, lid: u32) {
+    if control.stop != 0u {
+        return;
+    }
+    let local = local_index(lid);
+    for (var index = step.wide_batches; index < LAST_BATCH; index++) {
+        let end = start_of(index + 1u);
+        if start_of(index) == end {
+            continue;
+        }
+        for (var c = start_of(index) + local; c < end; c += WORKGROUP) {
+            visit(kind, c);
+        }
+        storageBarrier();
+    }
+    let first = start_of(LAST_BATCH);
+    let end = start_of(BATCHES);
+    for (var turn = 0u; turn < (end - first + TURN - 1u) / TURN; turn++) {
+        if local == turn % WORKGROUP {
+            for (var c = first + turn * TURN; c < min(first + (turn + 1u) * TURN, end); c++) {
+                visit(kind, c);
+            }
+        }
+        storageBarrier();
+    }
+}
+
+@compute @workgroup_size(256)
+fn warm_start_tail(@builtin(local_invocation_index) lid: u32) {
+    tail(WARM_START, lid);
+}
+
+@compute @workgroup_size(256)
+fn solve_tail(@builtin(local_invocation_index) lid: u32) {
+    tail(SOLVE, lid);
+}
+
+@compute @workgroup_size(256)
+fn relax_tail(@builtin(local_invocation_index) lid: u32) {
+    tail(RELAX, lid);
+}
+
+@compute @workgroup_size(256)
+fn restitution_tail(@builtin(local_invocation_index) lid: u32) {
+    tail(RESTITUTION, lid);
+}

@@ -1,0 +1,209 @@
+// Builds the step's solver bodies and constraint rows. Twin of crates/cpu/src/solver/prepare.rs.
+//
+//   bodies        one thread a body: `solver_bodies` from `work_states`, `props` and `masks` (the batches it is in)
+//   constraints   one thread a constraint, in batch order: `heads` and `points` from the manifold of its pair
+//   carry         the same: `impulses`, those of `slot_impulses` for points whose features stayed
+//
+// The masses that a point sees are as in Catto, "Iterative Dynamics with Temporal Coherence" (GDC 2005).
+
+//#import shared/body.wgsl
+//#import shared/collider.wgsl
+//#import shared/constraint.wgsl
+//#import shared/control.wgsl
+//#import shared/manifold.wgsl
+//#import shared/math.wgsl
+//#import shared/pair.wgsl
+//#import shared/step.wgsl
+//#import shared/thread.wgsl
+
+@group(0) @binding(0) var<uniform> control: Control;
+@group(0) @binding(1) var<uniform> step: StepParams;
+@group(0) @binding(2) var<storage, read> work_states: array<BodyState>;
+@group(0) @binding(3) var<storage, read> props: array<BodyProps>;
+@group(0) @binding(4) var<storage, read> masks: array<u32>;
+@group(0) @binding(5) var<storage, read_write> solver_bodies: array<SolverBody>;
+@group(0) @binding(6) var<storage, read> batch_order: array<u32>;
+@group(0) @binding(7) var<storage, read> next_pairs: array<Pair>;
+@group(0) @binding(8) var<storage, read> manifolds: array<Manifold>;
+@group(0) @binding(9) var<storage, read> colliders: array<Collider>;
+@group(0) @binding(10) var<storage, read> slot_impulses: array<Impulse>;
+@group(0) @binding(11) var<storage, read_write> heads: array<ConstraintHead>;
+@group(0) @binding(12) var<storage, read_write> points: array<ConstraintPoint>;
+@group(0) @binding(13) var<storage, read_write> impulses: array<Impulse>;
+
+// A body as the solver moves it; what nothing may push has no mass and keeps its velocity.
+fn prepare_body(i: u32) -> SolverBody {
+    var body: SolverBody;
+    body.linear_velocity = work_states[i].linear_velocity;
+    body.angular_velocity = work_states[i].angular_velocity;
+    body.touched = select(0u, 1u, (masks[2u * i] | masks[2u * i + 1u]) != 0u);
+    body.delta = vec4<f32>(0.0, 0.0, 0.0, 1.0);
+    if moves(work_states[i].flags) {
+        body.inverse_mass = props[i].inverse_mass;
+        // R diag(i) R^T, six of nine.
+        let r = mat3_from_quat(work_states[i].rotation);
+        let inertia = props[i].inverse_inertia;
+        let x = r[0] * inertia.x;
+        let y = r[1] * inertia.y;
+        let z = r[2] * inertia.z;
+        body.inverse_inertia_diagonal = x * r[0] + y * r[1] + z * r[2];
+        body.inverse_inertia_off = x.xxy * r[0].yzz + y.xxy * r[1].yzz + z.xxy * r[2].yzz;
+    }
+    return body;
+}
+
+@compute @workgroup_size(256)
+fn bodies(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i >= step.body_count || control.stop != 0u {
+        return;
+    }
+    solver_bodies[i] = prepare_body(i);
+}
+
+// Coefficient of two colliders by the stronger of their rules (`CombineRule`).
+fn combined(rule_a: u32, rule_b: u32, a: f32, b: f32) -> f32 {
+    switch max(rule_a, rule_b) {
+        case 0u: {
+            return 0.5 * (a + b);
+        }
+        case 1u: {
+            return min(a, b);
+        }
+        case 2u: {
+            return a * b;
+        }
+        default: {
+            return max(a, b);
+        }
+    }
+}
+
+fn inverse_inertia_times(body: SolverBody, v: vec3<f32>) -> vec3<f32> {
+    return symmetric_times(body.inverse_inertia_diagonal, body.inverse_inertia_off, v);
+}
+
+// Change of relative velocity along `v` by a unit impulse along `u`.
+fn response(
+    a: SolverBody,
+    b: SolverBody,
+    ra: vec3<f32>,
+    rb: vec3<f32>,
+    u: vec3<f32>,
+    v: vec3<f32>,
+) -> f32 {
+    let turn_a = cross(inverse_inertia_times(a, cross(ra, u)), ra);
+    let turn_b = cross(inverse_inertia_times(b, cross(rb, u)), rb);
+    return (a.inverse_mass + b.inverse_mass) * dot(u, v) + dot(v, turn_a + turn_b);
+}
+
+fn point_velocity(body: SolverBody, r: vec3<f32>) -> vec3<f32> {
+    return body.linear_velocity + cross(body.angular_velocity, r);
+}
+
+fn inverse(x: f32) -> f32 {
+    if x > 0.0 {
+        return 1.0 / x;
+    }
+    return 0.0;
+}
+
+@compute @workgroup_size(256)
+fn constraints(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let c = invocation(wg, num, lid);
+    if c >= control.solved || control.stop != 0u {
+        return;
+    }
+    let index = batch_order[c];
+    let pair = next_pairs[index];
+    let body_a = colliders[pair.a].body;
+    let body_b = colliders[pair.b].body;
+    let a = solver_bodies[body_a];
+    let b = solver_bodies[body_b];
+    let normal = manifolds[index].normal;
+    let count = manifolds[index].count;
+    let t = tangents(normal);
+    let between = work_states[body_b].position - work_states[body_a].position;
+    for (var i = 0u; i < min(count, 4u); i++) {
+        let point = manifolds[index].points[i];
+        let ra = point.anchor;
+        let rb = ra - between;
+        let k11 = response(a, b, ra, rb, t[0], t[0]);
+        let k12 = response(a, b, ra, rb, t[0], t[1]);
+        let k22 = response(a, b, ra, rb, t[1], t[1]);
+        // The stiffest direction's mass serves all: friction stays isotropic and never overshoots.
+        let stiffest = 0.5 * (k11 + k22) + sqrt(0.25 * (k11 - k22) * (k11 - k22) + k12 * k12);
+        let dv = point_velocity(b, rb) - point_velocity(a, ra);
+        points[4u * c + i] = ConstraintPoint(
+            ra,
+            point.separation - dot(normal, rb - ra),
+            rb,
+            inverse(response(a, b, ra, rb, normal, normal)),
+            inverse(stiffest),
+            dot(normal, dv),
+            0.0,
+            0u,
+        );
+    }
+    var head: ConstraintHead;
+    head.normal = normal;
+    head.friction = combined(
+        colliders[pair.a].combine & 3u,
+        colliders[pair.b].combine & 3u,
+        colliders[pair.a].friction,
+        colliders[pair.b].friction,
+    );
+    head.body_a = body_a;
+    head.body_b = body_b;
+    head.slot = pair.slot;
+    head.count = count;
+    head.restitution = combined(
+        (colliders[pair.a].combine >> 2u) & 3u,
+        (colliders[pair.b].combine >> 2u) & 3u,
+        colliders[pair.a].restitution,
+        colliders[pair.b].restitution,
+    );
+    if a.inverse_mass > 0.0 && b.inverse_mass > 0.0 {
+        head.bias_rate = step.bias_rate;
+        head.mass_scale = step.mass_scale;
+        head.impulse_scale = step.impulse_scale;
+    } else {
+        head.bias_rate = step.static_bias_rate;
+        head.mass_scale = step.static_mass_scale;
+        head.impulse_scale = step.static_impulse_scale;
+    }
+    heads[c] = head;
+}
+
+@compute @workgroup_size(256)
+fn carry(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let c = invocation(wg, num, lid);
+    if c >= control.solved || control.stop != 0u {
+        return;
+    }
+    let index = batch_order[c];
+    let slot = next_pairs[index].slot;
+    let fresh = (next_pairs[index].kind & PAIR_FRESH) != 0u;
+    for (var i = 0u; i < min(manifolds[index].count, 4u); i++) {
+        var impulse: Impulse;
+        impulse.feature = manifolds[index].features[i];
+        for (var s = 0u; s < 4u && !fresh; s++) {
+            if slot_impulses[4u * slot + s].feature == impulse.feature {
+                impulse = slot_impulses[4u * slot + s];
+            }
+        }
+        impulses[4u * c + i] = impulse;
+    }
+}

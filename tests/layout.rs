@@ -1,0 +1,245 @@
+//! The structs and constants of `shaders/shared` against those of `tumble_core::layout`: names, types, offsets, sizes
+//! and values. Oracle: the Rust compiler and naga.
+
+use std::any::type_name_of_val;
+use std::collections::{BTreeMap, BTreeSet};
+
+use bytemuck::Zeroable;
+use naga::{Expression, Handle, Literal, Module, ScalarKind, Type, TypeInner};
+use tumble_core::layout::*;
+
+/// Files of `shaders/shared` that hold no layout.
+const OTHERS: &[&str] = &["shared/math", "shared/thread", "shared/workgroup"];
+
+/// Fields whose Rust name WGSL keeps for itself: (struct, Rust, WGSL).
+const RENAMED: &[(&str, &str, &str)] = &[("Aabb", "class", "size_class"), ("EditRecord", "target", "target_slot")];
+
+#[derive(Debug, Clone, PartialEq)]
+struct Field {
+    name: String,
+    offset: usize,
+    bytes: usize,
+    /// `f32`, `u32` or a struct's name, whatever arrays and vectors are around it.
+    leaf: String,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Layout {
+    bytes: usize,
+    fields: Vec<Field>,
+}
+
+/// The layout of a Rust struct; does not compile unless every field is named.
+macro_rules! layouts {
+    ($($name:ident { $($field:ident),* $(,)? })*) => {
+        vec![$({
+            let value = $name::zeroed();
+            let $name { $($field: _),* } = value;
+            let fields = vec![$({
+                let (offset, bytes) = (std::mem::offset_of!($name, $field), std::mem::size_of_val(&value.$field));
+                rust_field(stringify!($name), stringify!($field), offset, bytes, type_name_of_val(&value.$field))
+            }),*];
+            (stringify!($name), Layout { bytes: std::mem::size_of::<$name>(), fields })
+        }),*]
+    };
+}
+
+fn rust_field(owner: &str, field: &str, offset: usize, bytes: usize, type_name: &str) -> Field {
+    let renamed = RENAMED.iter().find(|(name, rust, _)| *name == owner && *rust == field);
+    let name = renamed.map_or(field, |(_, _, wgsl)| wgsl).to_owned();
+    // `[tumble_core::layout::ManifoldPoint; 4]` and `[[u32; 4]; 7]` come down to their last path segment.
+    let leaf = type_name.trim_matches('[').split(';').next().unwrap().rsplit("::").next().unwrap().to_owned();
+    Field { name, offset, bytes, leaf }
+}
+
+fn rust_layouts() -> BTreeMap<&'static str, Layout> {
+    BTreeMap::from_iter(layouts! {
+        BodyState {
+            position, flags, rotation, linear_velocity, generation, angular_velocity, pad_a, force, pad_b, torque, pad_c
+        }
+        BodyProps {
+            inverse_inertia, inverse_mass, inertia, gravity_scale, center_of_mass, linear_damping, frame,
+            angular_damping, pad_a, pad_b, pad_c
+        }
+        SolverBody {
+            linear_velocity, inverse_mass, angular_velocity, touched, translation, pad_a, delta,
+            inverse_inertia_diagonal, pad_b, inverse_inertia_off, pad_c
+        }
+        PoseRecord { translation, flags, rotation }
+        Collider { size, shape, position, body, rotation, friction, restitution, combine, born }
+        Aabb { min, body, max, class }
+        Pair { a, b, slot, kind }
+        ManifoldPoint { anchor, separation }
+        Manifold { normal, count, features, points }
+        ConstraintHead {
+            normal, friction, body_a, body_b, slot, count, restitution, bias_rate, mass_scale, impulse_scale
+        }
+        ConstraintPoint {
+            anchor_a, adjusted_separation, anchor_b, normal_mass, tangent_mass, approach, max_impulse, pad_a
+        }
+        Impulse { normal, tangent, feature }
+        Control {
+            stop, overflow, needed, step, old_pair_count, free_count, recolor, frozen_count, pair_count, processed,
+            new_count, dead_count, constraint_count, point_count, batch_count, rounds, unplaced, last_count,
+            large_count, max_degree, solved, dropped, cell_class, cell_bits, center_min, inverse_cell, center_max,
+            pad_a, batch_start, quarantined, pad_b
+        }
+        EditRecord { op, target, kind, generation, data }
+        EditRange { first, count }
+        StepParams {
+            dt, h, inverse_h, substeps, gravity, step, bias_rate, mass_scale, impulse_scale, push_speed,
+            speculative_distance, restitution_threshold, body_count, collider_count, pair_capacity, cell_table_bits,
+            large_limit, edit_ranges, drop_pair, write_poses, batch_rounds, last_limit, wide_batches,
+            static_bias_rate, static_mass_scale, static_impulse_scale
+        }
+    })
+}
+
+/// (module or nothing, name) of a Rust constant, its name in WGSL, its value.
+macro_rules! constants {
+    ($($module:ident as $prefix:literal { $($name:ident),* $(,)? })* ; $($plain:ident),*) => {
+        vec![
+            $($((concat!(stringify!($module), "::", stringify!($name)), concat!($prefix, stringify!($name)),
+                $module::$name)),*,)*
+            $((stringify!($plain), stringify!($plain), $plain as u32)),*
+        ]
+    };
+}
+
+fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
+    constants! {
+        body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN }
+        shape_kind as "SHAPE_" { NONE, BALL, CUBOID, HALFSPACE }
+        aabb_body as "AABB_" { INDEX, DYNAMIC, LIVE }
+        pair_kind as "PAIR_" {
+            NONE, BALL_BALL, BALL_CUBOID, CUBOID_CUBOID, BALL_HALFSPACE, CUBOID_HALFSPACE, COUNT, MASK, FRESH
+        }
+        overflow as "OVERFLOW_" { NONE, PAIRS, CELL, LAST_BATCH }
+        edit_op as "EDIT_" {
+            SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, COLLIDER,
+            COLLIDER_MOVE, COLLIDER_REMOVE
+        }
+        ;
+        BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT
+    }
+}
+
+fn modules() -> Vec<(&'static str, Module)> {
+    let shared = |stem: &str| stem.starts_with("shared/") && !OTHERS.contains(&stem);
+    let stems = tumble_shaders::SOURCES.iter().map(|(stem, _)| *stem).filter(|stem| shared(stem));
+    let parse = |stem| {
+        let composed = tumble_shaders::compose(stem).unwrap();
+        (stem, naga::front::wgsl::parse_str(&composed.source).unwrap())
+    };
+    stems.map(parse).collect()
+}
+
+fn leaf(module: &Module, ty: Handle<Type>) -> String {
+    let scalar = |scalar: naga::Scalar| match scalar.kind {
+        ScalarKind::Float => format!("f{}", 8 * scalar.width),
+        ScalarKind::Uint => format!("u{}", 8 * scalar.width),
+        kind => format!("{kind:?}"),
+    };
+    match &module.types[ty].inner {
+        TypeInner::Scalar(inner) => scalar(*inner),
+        TypeInner::Vector { scalar: inner, .. } => scalar(*inner),
+        TypeInner::Array { base, .. } => leaf(module, *base),
+        TypeInner::Struct { .. } => module.types[ty].name.clone().unwrap(),
+        other => format!("{other:?}"),
+    }
+}
+
+fn wgsl_layouts(module: &Module) -> Vec<(String, Layout)> {
+    let mut layouts = Vec::new();
+    for (_, ty) in module.types.iter() {
+        let TypeInner::Struct { members, span } = &ty.inner else { continue };
+        let field = |member: &naga::StructMember| Field {
+            name: member.name.clone().unwrap(),
+            offset: member.offset as usize,
+            bytes: module.types[member.ty].inner.size(module.to_ctx()) as usize,
+            leaf: leaf(module, member.ty),
+        };
+        let layout = Layout { bytes: *span as usize, fields: members.iter().map(field).collect() };
+        layouts.push((ty.name.clone().unwrap(), layout));
+    }
+    layouts
+}
+
+fn wgsl_constants(module: &Module) -> Vec<(String, u32)> {
+    let value = |constant: &naga::Constant| match module.global_expressions[constant.init] {
+        Expression::Literal(Literal::U32(value)) => value,
+        ref other => panic!("{:?} is {other:?}, not a u32", constant.name),
+    };
+    module.constants.iter().map(|(_, constant)| (constant.name.clone().unwrap(), value(constant))).collect()
+}
+
+#[test]
+fn structs_agree() {
+    let rust = rust_layouts();
+    let mut seen = BTreeSet::new();
+    for (stem, module) in modules() {
+        for (name, layout) in wgsl_layouts(&module) {
+            let expected = rust.get(name.as_str()).unwrap_or_else(|| panic!("{stem}: no struct {name} in Rust"));
+            for (ours, theirs) in layout.fields.iter().zip(&expected.fields) {
+                assert_eq!(ours, theirs, "{stem}: {name} (left WGSL, right Rust)");
+            }
+            assert_eq!(layout.fields.len(), expected.fields.len(), "{stem}: number of fields of {name}");
+            assert_eq!(layout.bytes, expected.bytes, "{stem}: size of {name}");
+            assert!(seen.insert(name), "{stem}: a struct that another file has too");
+        }
+    }
+    assert_eq!(seen.iter().map(String::as_str).collect::<Vec<_>>(), rust.keys().copied().collect::<Vec<_>>());
+}
+
+#[test]
+fn constants_agree() {
+    let mut wgsl = BTreeMap::new();
+    for (stem, module) in modules() {
+        for (name, value) in wgsl_constants(&module) {
+            assert!(wgsl.insert(name, (stem, value)).is_none(), "{stem}: a constant that another file has too");
+        }
+    }
+    let mut expected: BTreeMap<String, u32> =
+        rust_constants().into_iter().map(|(_, name, value)| (name.to_owned(), value)).collect();
+    for field in &rust_layouts()["Control"].fields {
+        if !field.name.starts_with("pad_") {
+            expected.insert(format!("CONTROL_{}", field.name.to_uppercase()), field.offset as u32 / 4);
+        }
+    }
+    for (name, (stem, value)) in &wgsl {
+        assert_eq!(Some(value), expected.get(name), "{stem}: {name} (left WGSL, right Rust)");
+    }
+    let missing: Vec<_> = expected.keys().filter(|name| !wgsl.contains_key(*name)).collect();
+    assert!(missing.is_empty(), "not in WGSL: {missing:?}");
+}
+
+/// The two tables above are written by hand: every public struct and constant of the layout files is in them.
+#[test]
+fn tables_are_complete() {
+    let layouts = rust_layouts();
+    let constants: BTreeSet<_> = rust_constants().into_iter().map(|(name, _, _)| name).collect();
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/crates/core/src/layout");
+    let mut found = 0;
+    for file in std::fs::read_dir(folder).unwrap() {
+        let path = file.unwrap().path();
+        let mut module = String::new();
+        for line in std::fs::read_to_string(&path).unwrap().lines() {
+            let words: Vec<_> = line.split([' ', ':', '{', '(']).filter(|word| !word.is_empty()).collect();
+            match words.as_slice() {
+                ["pub", "mod", name, ..] => module = format!("{name}::"),
+                ["}"] if !line.starts_with(' ') => module.clear(),
+                ["pub", "struct", name, ..] => {
+                    assert!(layouts.contains_key(name), "{path:?}: struct {name} is in no table");
+                    found += 1;
+                }
+                ["pub", "const", name, ..] => {
+                    let name = format!("{module}{name}");
+                    assert!(constants.contains(name.as_str()), "{path:?}: constant {name} is in no table");
+                    found += 1;
+                }
+                _ => {}
+            }
+        }
+    }
+    assert_eq!(found, layouts.len() + constants.len());
+}
