@@ -74,10 +74,6 @@ fn small(v: vec3<f32>) -> bool {
     return is_finite3(v) && max_element(abs(v)) <= STATE_LIMIT;
 }
 
-fn max_element(v: vec3<f32>) -> f32 {
-    return max(v.x, max(v.y, v.z));
-}
-
 @compute @workgroup_size(256)
 fn collider_bounds(
     @builtin(workgroup_id) wg: vec3<u32>,

@@ -9,14 +9,17 @@
 //   find_new       one thread a pair: next_pairs, fresh_rank = 1 if it is new. Reads pair_keys, pairs, colliders.
 //   (primitives/scan of fresh_rank, total to NEW_COUNT)
 //   list_dead      one thread a pair of the last step: dead_slots, in the order of that list. Reads dead_rank, pairs.
-//   assign         one thread a pair: slots of new ones in next_pairs, empty manifolds. Reads fresh_rank, dead_slots,
-//                  free_slots; counts pairs that no narrow phase treats (two half-spaces) as visited.
+//   assign         one thread a pair: slots of new ones in next_pairs, empty manifolds; counts pairs that no narrow
+//                  phase treats (two half-spaces) as visited. Reads fresh_rank, dead_slots, free_slots.
 // and once the step is known to be good (all of these return when it stopped):
-//   commit_pairs   one thread a pair: pairs = next_pairs; batch_of_slot; slot_impulses of pairs that do not touch. Reads
-//                  manifolds, pair_batch.
+//   commit_pairs   one thread a pair: pairs = next_pairs; batch_of_slot; slot_impulses of pairs that do not touch.
+//                  Reads manifolds, pair_batch.
+//   commit_found   one thread a pair: found_manifolds (by slot) of pairs whose contact was found anew. Reads
+//                  next_pairs, manifolds, colliders, work_states.
 //   commit_free    one thread a dead pair: slots that no new one took go on free_slots. Reads dead_slots.
 //   commit_counts  one invocation: the counters that outlive the step.
 
+//#import shared/body.wgsl
 //#import shared/collider.wgsl
 //#import shared/constraint.wgsl
 //#import shared/control.wgsl
@@ -47,6 +50,8 @@ const NEXT_FROZEN_COUNT: u32 = 108u;
 @group(0) @binding(12) var<storage, read> pair_batch: array<u32>;
 @group(0) @binding(13) var<storage, read_write> batch_of_slot: array<u32>;
 @group(0) @binding(14) var<storage, read_write> slot_impulses: array<Impulse>;
+@group(0) @binding(15) var<storage, read> work_states: array<BodyState>;
+@group(0) @binding(16) var<storage, read_write> found_manifolds: array<FoundManifold>;
 
 // Which pass treats a pair of these shapes.
 fn kind_of(a: u32, b: u32) -> u32 {
@@ -218,6 +223,24 @@ fn commit_pair(point_count: u32, batch: u32, slot: u32) {
         }
     } else {
         batch_of_slot[slot] = batch;
+    }
+}
+
+@compute @workgroup_size(256)
+fn commit_found(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i >= control.pair_count || control.stop != 0u {
+        return;
+    }
+    if manifolds[i].recycled == 0u {
+        let pair = next_pairs[i];
+        let rotation_a = work_states[colliders[pair.a].body].rotation;
+        let rotation_b = work_states[colliders[pair.b].body].rotation;
+        found_manifolds[pair.slot] = FoundManifold(rotation_a, rotation_b, manifolds[i]);
     }
 }
 

@@ -70,7 +70,7 @@ fn apply(
         let record = edit_records[range.first + k];
         let slot = record.target_slot;
         if record.op >= EDIT_COLLIDER {
-            colliders[slot] = apply_to_collider(record, colliders[slot].born);
+            colliders[slot] = apply_to_collider(record);
         } else {
             var state = work_states[slot];
             var own_props = props[slot];
@@ -81,7 +81,7 @@ fn apply(
     }
 }
 
-fn apply_to_collider(record: EditRecord, born_before: u32) -> Collider {
+fn apply_to_collider(record: EditRecord) -> Collider {
     var collider: Collider;
     collider.size = xyz(record.data[0]);
     collider.shape = record.data[0].w;
@@ -91,7 +91,7 @@ fn apply_to_collider(record: EditRecord, born_before: u32) -> Collider {
     collider.friction = bitcast<f32>(record.data[3].x);
     collider.restitution = bitcast<f32>(record.data[3].y);
     collider.combine = record.data[3].z;
-    collider.born = select(step.step, born_before, record.op == EDIT_COLLIDER_MOVE);
+    collider.born = step.step;
     return collider;
 }
 

@@ -81,8 +81,8 @@ fn cayley(w: vec3<f32>, h: f32) -> vec4<f32> {
     return unit(vec4<f32>(0.5 * h * w, 1.0));
 }
 
-// The rotation by |w| h about w, where that is no more than one radian. Sine and cosine by their series, good to the last
-// bit or two there: WGSL promises them to 2^-11 only, which would slow a spin by a visible share.
+// The rotation by |w| h about w, where that is no more than one radian. Sine and cosine by their series, good to the
+// last bit or two there: WGSL promises them to 2^-11 only, which could slow a spin by a visible share.
 fn half_turn(w: vec3<f32>, h: f32) -> vec4<f32> {
     let half = 0.5 * h * w;
     let s = dot(half, half);
@@ -92,8 +92,8 @@ fn half_turn(w: vec3<f32>, h: f32) -> vec4<f32> {
 }
 
 // Rotation over `h`: the implicit midpoint rule for Euler's equation in the body's frame with Cayley's map, two Newton
-// steps, and the change of the angular velocity added as a difference, which keeps rounding out of it. Turns of more than
-// one radian are made in pieces.
+// steps, and the change of the angular velocity added as a difference, which keeps rounding out of it. Turns of more
+// than one radian are made in pieces.
 fn turn(i: u32, h: f32) {
     let inertia = props[i].inertia;
     let start = work_states[i].rotation;
@@ -211,5 +211,5 @@ fn write_poses(
     }
     let rotation = unit(multiply(states[i].rotation, conjugate(props[i].frame)));
     let translation = states[i].position - rotate(rotation, props[i].center_of_mass);
-    poses[i] = PoseRecord(translation, states[i].flags, rotation);
+    poses[i] = PoseRecord(translation, states[i].flags | (states[i].generation << 8u), rotation);
 }

@@ -1,24 +1,48 @@
-//! stub
+//! **tumble** simulates rigid bodies on any GPU that wgpu reaches, and on the CPU. Every pass exists twice: a WGSL
+//! compute shader, and a plain Rust function that computes the same thing.
+//!
+//! ```
+//! use tumble::prelude::*;
+//!
+//! # fn main() -> Result<()> {
+//! let mut scene = Scene::new();
+//! scene.insert(RigidBodyBuilder::fixed(), ColliderBuilder::halfspace(Vec3::Y));
+//! let ball = scene.insert(
+//!     RigidBodyBuilder::dynamic().translation(Vec3::new(0.0, 10.0, 0.0)),
+//!     ColliderBuilder::ball(0.5).restitution(0.7),
+//! );
+//! scene.attach(ball.body, ColliderBuilder::cuboid(0.1, 0.1, 0.1).translation(Vec3::X))?;
+//! let mut world = World::new(scene, Params::default(), Backend::Auto)?;
+//! for _ in 0..300 {
+//!     world.step()?;
+//! }
+//! let report = world.sync()?;
+//! let poses = world.poses()?;
+//! println!("{:?} {report}", poses[ball.body]);
+//! assert!(poses[ball.body].translation.y < 1.0);
+//! # Ok(())
+//! # }
+//! ```
+
+mod world;
+
 #[cfg(feature = "cpu")]
 pub use tumble_cpu as cpu;
+#[cfg(feature = "gpu")]
+pub use tumble_gpu as gpu;
+
+pub use tumble_core as core;
+pub use tumble_core::{
+    BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Editor, Error, Inserted, Params,
+    Pose, Poses, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, StepReport, Velocities, Velocity,
+};
+pub use world::{Backend, World};
+
+/// What most programs need.
 pub mod prelude {
-    pub use tumble_core::*;
-    pub enum Backend {
-        Gpu,
-    }
-    pub struct World;
-    impl World {
-        pub fn new(_: Scene, _: Params, _: Backend) -> Result<Self> {
-            Ok(World)
-        }
-        pub fn step(&mut self) -> Result<()> {
-            Ok(())
-        }
-        pub fn sync(&mut self) -> Result<()> {
-            Ok(())
-        }
-        pub fn poses(&mut self) -> Result<Poses> {
-            todo!()
-        }
-    }
+    pub use crate::{
+        Backend, BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Error, Params, Pose,
+        Poses, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, StepReport, Velocities, Velocity, World,
+    };
+    pub use glam::{Quat, Vec3};
 }

@@ -8,8 +8,17 @@ use bytemuck::Zeroable;
 use naga::{Expression, Handle, Literal, Module, ScalarKind, Type, TypeInner};
 use tumble_core::layout::*;
 
-/// Files of `shaders/shared` that hold no layout.
-const OTHERS: &[&str] = &["shared/math", "shared/thread", "shared/workgroup"];
+/// The files of `shaders/shared` that hold what the host holds too; the others are helpers of shaders.
+const LAYOUTS: &[&str] = &[
+    "shared/body",
+    "shared/collider",
+    "shared/constraint",
+    "shared/control",
+    "shared/edit",
+    "shared/manifold",
+    "shared/pair",
+    "shared/step",
+];
 
 /// Fields whose Rust name WGSL keeps for itself: (struct, Rust, WGSL).
 const RENAMED: &[(&str, &str, &str)] = &[("Aabb", "class", "size_class"), ("EditRecord", "target", "target_slot")];
@@ -65,12 +74,13 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             linear_velocity, inverse_mass, angular_velocity, touched, translation, pad_a, delta,
             inverse_inertia_diagonal, pad_b, inverse_inertia_off, pad_c
         }
-        PoseRecord { translation, flags, rotation }
+        PoseRecord { translation, tag, rotation }
         Collider { size, shape, position, body, rotation, friction, restitution, combine, born }
         Aabb { min, body, max, class }
         Pair { a, b, slot, kind }
         ManifoldPoint { anchor, separation }
-        Manifold { normal, count, features, points }
+        Manifold { normal, count, features, between, recycled, points }
+        FoundManifold { rotation_a, rotation_b, manifold }
         ConstraintHead {
             normal, friction, body_a, body_b, slot, count, restitution, bias_rate, mass_scale, impulse_scale
         }
@@ -117,7 +127,7 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
         overflow as "OVERFLOW_" { NONE, PAIRS, CELL, LAST_BATCH }
         edit_op as "EDIT_" {
             SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, COLLIDER,
-            COLLIDER_MOVE, COLLIDER_REMOVE
+            COLLIDER_REMOVE
         }
         ;
         BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT
@@ -125,13 +135,11 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
 }
 
 fn modules() -> Vec<(&'static str, Module)> {
-    let shared = |stem: &str| stem.starts_with("shared/") && !OTHERS.contains(&stem);
-    let stems = tumble_shaders::SOURCES.iter().map(|(stem, _)| *stem).filter(|stem| shared(stem));
     let parse = |stem| {
         let composed = tumble_shaders::compose(stem).unwrap();
-        (stem, naga::front::wgsl::parse_str(&composed.source).unwrap())
+        (stem, naga::front::wgsl::parse_str(&composed.source).unwrap_or_else(|error| panic!("{stem}: {error}")))
     };
-    stems.map(parse).collect()
+    LAYOUTS.iter().copied().map(parse).collect()
 }
 
 fn leaf(module: &Module, ty: Handle<Type>) -> String {

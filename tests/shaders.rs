@@ -9,9 +9,17 @@ use naga::back::{hlsl, msl, spv};
 use tumble_core::Error;
 use tumble_gpu::{Gpu, Pipelines, Shader, pipelines::build_pass};
 
+/// Every shader, parsed; all that is wrong with any of them is said at once.
 fn shaders() -> Vec<(&'static str, Shader)> {
-    let parse = |stem| Shader::parse(&tumble_shaders::compose(stem).unwrap()).unwrap_or_else(|error| panic!("{error}"));
-    tumble_shaders::SOURCES.iter().map(|(stem, _)| (*stem, parse(stem))).collect()
+    let (mut shaders, mut errors) = (Vec::new(), Vec::new());
+    for (stem, _) in tumble_shaders::SOURCES {
+        match Shader::parse(&tumble_shaders::compose(stem).unwrap_or_else(|error| panic!("{error}"))) {
+            Ok(shader) => shaders.push((*stem, shader)),
+            Err(error) => errors.push(error.to_string()),
+        }
+    }
+    assert!(errors.is_empty(), "{}", errors.join("\n"));
+    shaders
 }
 
 #[test]

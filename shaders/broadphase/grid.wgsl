@@ -14,10 +14,10 @@
 //   (primitives/sort of pair_keys)
 //
 // After Le Grand, "Broad-Phase Collision Detection with CUDA" (GPU Gems 3, 2007) and Harada (GDC 2009): a collider goes
-// into the one cell that holds the middle of its box; a cell is wider than any box in it. The table wraps: cell
-// (x, y, z) lies at the low bits of its coordinates, at least two bits an axis, so that the 27 neighbours never fold onto
-// each other; what folds from afar is thrown out by the boxes. The smallest class is taken that leaves no more than
-// `large_limit` colliders out.
+// into the one cell that holds the middle of its box; a cell is wider than any box in it. The smallest size class is
+// taken that leaves no more than `large_limit` colliders out. The table wraps: cell (x, y, z) lies at the low bits of
+// its coordinates, at least two bits an axis, so that the 27 neighbours never fold onto each other; what folds from
+// afar is thrown out by the boxes.
 
 //#import shared/aabb.wgsl
 //#import shared/control.wgsl

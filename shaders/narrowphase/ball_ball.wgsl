@@ -13,7 +13,9 @@ fn collide(
     let mine = is_mine(i, PAIR_BALL_BALL);
     var manifold: Manifold;
     if mine {
-        manifold = manifold_of(couple_of(i));
+        let couple = couple_of(i);
+        manifold = manifold_of(couple);
+        manifold.between = couple.b.center;
     }
     finish(i, local_index(lid), mine, manifold);
 }

@@ -13,7 +13,9 @@ fn collide(
     let mine = is_mine(i, PAIR_BALL_CUBOID);
     var manifold: Manifold;
     if mine {
-        manifold = manifold_of(couple_of(i), swapped(i));
+        let couple = couple_of(i);
+        manifold = manifold_of(couple, swapped(i));
+        manifold.between = couple.b.center;
     }
     finish(i, local_index(lid), mine, manifold);
 }

@@ -47,6 +47,7 @@ struct Frame {
     rotation: vec4<f32>,
     outward: vec3<f32>, // normal of the reference face
     normal: vec3<f32>, // from a to b
+    spare: f32, // how much farther points are kept, that may come to touch while the manifold is recycled
     first_feature: u32,
 }
 
@@ -60,7 +61,12 @@ fn collide(
     let mine = is_mine(i, PAIR_CUBOID_CUBOID);
     var manifold: Manifold;
     if mine {
-        manifold = manifold_of(couple_of(i));
+        let couple = couple_of(i);
+        manifold = recycled(i, couple);
+        if manifold.count == 0u {
+            manifold = manifold_of(couple);
+            manifold.between = couple.b.center;
+        }
     }
     finish(i, local_index(lid), mine, manifold);
 }
@@ -99,6 +105,7 @@ fn manifold_of(couple: Couple) -> Manifold {
     outward[r.axis] = r.side;
     frame.outward = rotate(frame.rotation, outward);
     frame.normal = select(-frame.outward, frame.outward, on_a);
+    frame.spare = recycle_distance(couple);
     frame.first_feature = FACE * 8u * axis.index;
     var candidates: Candidates;
     clip_faces(&candidates, r, frame, couple);
@@ -107,10 +114,6 @@ fn manifold_of(couple: Couple) -> Manifold {
 
 fn sign_of(x: f32) -> f32 {
     return select(1.0, -1.0, x < 0.0);
-}
-
-fn min_element(v: vec3<f32>) -> f32 {
-    return min(v.x, min(v.y, v.z));
 }
 
 // m * v, summed in the order of the columns.
@@ -295,7 +298,7 @@ fn give(
     q[v] = clamp(q[v], -r.size[v], r.size[v]);
     let separation = p[k] * r.side - r.size[k];
     let point = frame.origin + rotate(frame.rotation, q) - frame.outward * (0.5 * separation);
-    if separation <= reach(couple, point, frame.normal) {
+    if separation <= reach(couple, point, frame.normal) + frame.spare {
         push(candidates, point, separation, frame.first_feature + feature);
     }
 }

@@ -14,7 +14,12 @@ fn collide(
     let mine = is_mine(i, PAIR_CUBOID_HALFSPACE);
     var manifold: Manifold;
     if mine {
-        manifold = manifold_of(couple_of(i), swapped(i));
+        let couple = couple_of(i);
+        manifold = recycled(i, couple);
+        if manifold.count == 0u {
+            manifold = manifold_of(couple, swapped(i));
+            manifold.between = couple.b.center;
+        }
     }
     finish(i, local_index(lid), mine, manifold);
 }
@@ -34,13 +39,15 @@ fn manifold_of(pair: Couple, is_swapped: bool) -> Manifold {
     if dot(normal, cuboid.position - plane.position) - down > farthest(couple) {
         return Manifold();
     }
+    // Points that may come to touch while the manifold is recycled.
+    let spare = recycle_distance(couple);
     var corners: Candidates;
     for (var corner = 0u; corner < 8u; corner++) {
         let side = vec3<f32>((vec3<u32>(corner) >> vec3<u32>(0u, 1u, 2u)) & vec3<u32>(1u)) * 2.0 - vec3<f32>(1.0);
         let at = cuboid.position + rotate(cuboid.rotation, side * cuboid.size);
         let separation = dot(normal, at - plane.position);
         let point = at - normal * (0.5 * separation);
-        if separation <= reach(couple, point, normal) {
+        if separation <= reach(couple, point, normal) + spare {
             push(&corners, point, separation, corner);
         }
     }

@@ -37,7 +37,7 @@ struct SortParams {
 @group(0) @binding(5) var<storage, read_write> values_out: array<u32>;
 @group(0) @binding(6) var<storage, read_write> histogram: array<u32>;
 
-var<workgroup> digit_count: array<atomic<u32>, DIGITS>;
+var<workgroup> digit_count: array<atomic<u32>, DIGITS>; // zero at first, like all workgroup memory
 var<workgroup> counters: array<u32, 2048>; // 8 x 256: counter words of all invocations, word by word
 var<workgroup> order: array<u32, BLOCK>; // which element comes at which place of the sorted block
 

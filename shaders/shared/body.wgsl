@@ -52,7 +52,7 @@ struct SolverBody {
 
 struct PoseRecord {
     translation: vec3<f32>,
-    flags: u32,
+    tag: u32,
     rotation: vec4<f32>,
 }
 

@@ -6,6 +6,9 @@
 //#import shared/manifold.wgsl
 //#import shared/math.wgsl
 
+// Share of the smaller collider's least half extent that the two may move against each other.
+const RECYCLE_SHARE: f32 = 0.05;
+
 // A collider where it is, relative to the centre of mass of the pair's first body.
 struct Placed {
     size: vec3<f32>, // radius or half extents
@@ -14,6 +17,7 @@ struct Placed {
     center: vec3<f32>, // centre of mass of its body
     linear: vec3<f32>, // velocity of the centre of mass
     angular: vec3<f32>,
+    body_rotation: vec4<f32>, // of the body's principal frame
 }
 
 // Two placed colliders and how far ahead to look.
@@ -32,6 +36,7 @@ fn placed(c: Collider, s: BodyState, center: vec3<f32>) -> Placed {
         center,
         s.linear_velocity,
         s.angular_velocity,
+        s.rotation,
     );
 }
 
@@ -44,6 +49,15 @@ fn place(ca: Collider, sa: BodyState, cb: Collider, sb: BodyState, distance: f32
 // The same two with their roles exchanged.
 fn swap(couple: Couple) -> Couple {
     return Couple(couple.b, couple.a, couple.distance, couple.dt);
+}
+
+fn smallest(p: Placed) -> f32 {
+    return select(3.4e38, min_element(p.size), p.size.x > 0.0);
+}
+
+// How far the two may move against each other before their contact is found anew.
+fn recycle_distance(couple: Couple) -> f32 {
+    return RECYCLE_SHARE * min(smallest(couple.a), smallest(couple.b));
 }
 
 // How far apart the two may be at a point and still need a contact in this step.

@@ -12,8 +12,7 @@ const EDIT_FORCE: u32 = 8u;
 const EDIT_FORCE_AT: u32 = 9u;
 const EDIT_FREEZE: u32 = 10u;
 const EDIT_COLLIDER: u32 = 11u;
-const EDIT_COLLIDER_MOVE: u32 = 12u;
-const EDIT_COLLIDER_REMOVE: u32 = 13u;
+const EDIT_COLLIDER_REMOVE: u32 = 12u;
 
 struct EditRecord {
     op: u32,

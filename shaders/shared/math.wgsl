@@ -85,3 +85,11 @@ fn tangents(n: vec3<f32>) -> mat2x3<f32> {
     t = t * (1.0 / sqrt(dot(t, t)));
     return mat2x3<f32>(t, cross(n, t));
 }
+
+fn min_element(v: vec3<f32>) -> f32 {
+    return min(v.x, min(v.y, v.z));
+}
+
+fn max_element(v: vec3<f32>) -> f32 {
+    return max(v.x, max(v.y, v.z));
+}

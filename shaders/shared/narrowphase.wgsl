@@ -1,8 +1,9 @@
 // What every pass of stage narrowphase binds, and how it begins and ends. Twin of crates/cpu/src/narrowphase/mod.rs.
 //
-// Each is one entry point `collide`, one thread a pair; those of another kind, and the one that a test drops, do nothing.
-// Reads next_pairs, colliders, work_states; writes manifolds that have points (contact:assign left them empty); counts
-// visited pairs, constraints and points in counters, summed per workgroup first.
+// Each is one entry point `collide`, one thread a pair; those of another kind, and the one that a test drops, do
+// nothing. Reads next_pairs, colliders, work_states, and with boxes found_manifolds (by slot); writes manifolds that
+// have points (contact:assign left them empty); counts visited pairs, constraints and points in counters, summed per
+// workgroup first.
 //
 // A manifold has up to four points, each midway between the surfaces, with the gap along one common normal (from a to
 // b) and the features that meet there. A point is kept while its gap is below the speculative distance plus the way
@@ -14,6 +15,7 @@
 //#import shared/couple.wgsl
 //#import shared/manifold.wgsl
 //#import shared/pair.wgsl
+//#import shared/recycle.wgsl
 //#import shared/step.wgsl
 //#import shared/thread.wgsl
 
@@ -23,6 +25,7 @@
 @group(0) @binding(3) var<storage, read> colliders: array<Collider>;
 @group(0) @binding(4) var<storage, read> work_states: array<BodyState>;
 @group(0) @binding(5) var<storage, read_write> manifolds: array<Manifold>;
+@group(0) @binding(6) var<storage, read> found_manifolds: array<FoundManifold>;
 
 var<workgroup> visited: atomic<u32>;
 var<workgroup> constraints: atomic<u32>;
@@ -43,6 +46,14 @@ fn couple_of(i: u32) -> Couple {
 // Whether the shape of higher number comes first.
 fn swapped(i: u32) -> bool {
     return colliders[next_pairs[i].a].shape > colliders[next_pairs[i].b].shape;
+}
+
+// The manifold that the pair's slot remembers with this step's gaps; one without points if it must be found anew.
+fn recycled(i: u32, couple: Couple) -> Manifold {
+    if (next_pairs[i].kind & PAIR_FRESH) != 0u {
+        return Manifold();
+    }
+    return recycle(couple, found_manifolds[next_pairs[i].slot]);
 }
 
 // Writes and counts what invocation `local` found. To be called by all of a workgroup at once.

@@ -131,7 +131,7 @@ fn constraints(
     let normal = manifolds[index].normal;
     let count = manifolds[index].count;
     let t = tangents(normal);
-    let between = work_states[body_b].position - work_states[body_a].position;
+    let between = manifolds[index].between;
     for (var i = 0u; i < min(count, 4u); i++) {
         let point = manifolds[index].points[i];
         let ra = point.anchor;

@@ -1,8 +1,8 @@
 // The law of one visit: soft contacts with a friction cone. Twin of crates/cpu/src/solver/soft.rs. No pass, no binding;
 // `solver/passes` visits the points of a constraint with it.
 //
-// Catto, "Soft Constraints" (GDC 2011) and "Solver2D" (2024): a contact is a damped spring in the solve visit, and rigid
-// in the relax visit. What a push does to a body is checked before it is done: one that is not finite is dropped.
+// Catto, "Soft Constraints" (GDC 2011) and "Solver2D" (2024): a contact is a damped spring in the solve visit, and
+// rigid in the relax visit. Each push is checked before it is done: one that is not finite is dropped.
 
 //#import shared/body.wgsl
 //#import shared/constraint.wgsl

@@ -24,12 +24,6 @@ impl RapierWorld {
         let mut world = r::PhysicsWorld { gravity: scene.gravity, ..r::PhysicsWorld::default() };
         world.integration_parameters.dt = params.dt;
         world.integration_parameters.num_solver_iterations = params.substeps as usize;
-            world.integration_parameters.contact_recycling = false;
-        }
-            world.integration_parameters.friction_in_bias_pass = true;
-        }
-            world.integration_parameters.friction_model = r::FrictionModel::Coulomb;
-        }
         world.physics_pipeline.configure_thread_pool(threads).expect("rapier's threads start");
         let mut bodies = Vec::new();
         for handle in scene.bodies() {

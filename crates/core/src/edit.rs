@@ -75,7 +75,8 @@ impl Editor {
         Ok(inserted)
     }
 
-    /// Adds a further collider to a body; mass and inertia follow, the body's own frame and motion stay.
+    /// Adds a further collider to a body; mass and inertia follow, the body's own frame and motion stay. Its contacts
+    /// are found anew.
     pub fn attach(&mut self, body: BodyHandle, collider: ColliderBuilder) -> Result<ColliderHandle> {
         let (_, before, _) = pack_body(&self.scene, body)?;
         let handle = self.scene.attach(body, collider)?;
@@ -86,8 +87,7 @@ impl Editor {
         record.data[6] = before.frame.map(f32::to_bits);
         self.records.push(record);
         for (slot, collider) in colliders {
-            let op = if slot == handle.slot() { edit_op::COLLIDER } else { edit_op::COLLIDER_MOVE };
-            self.push_collider(op, slot, &collider);
+            self.push_collider(edit_op::COLLIDER, slot, &collider);
         }
         Ok(handle)
     }

@@ -40,3 +40,6 @@ pub const WIDE_ROUNDS: u32 = 8;
 pub fn tail_rounds(left: u32) -> u32 {
     (BATCH_ROUNDS - WIDE_ROUNDS).min(24_000 / left.div_ceil(256).max(1))
 }
+
+/// Bytes of the widest array that follows the number of pairs.
+pub const BYTES_A_PAIR: u64 = 192;

@@ -24,6 +24,9 @@ pub struct Velocity {
     pub angular: Vec3,
 }
 
+/// Bits of a generation that results carry.
+const GENERATION: u32 = 0x00ff_ffff;
+
 /// A value for each body, as of the end of one step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PerBody<T> {
@@ -44,14 +47,14 @@ impl<T> PerBody<T> {
             if slots.len() <= body.slot() {
                 slots.resize_with(body.slot() + 1, || None);
             }
-            slots[body.slot()] = Some((body.generation(), value));
+            slots[body.slot()] = Some((body.generation() & GENERATION, value));
         }
         Self { step, values: slots }
     }
     /// The value of `body`, or [`Error::StaleBody`].
     pub fn get(&self, body: BodyHandle) -> Result<&T> {
         match self.values.get(body.slot()) {
-            Some(Some((generation, value))) if *generation == body.generation() => Ok(value),
+            Some(Some((generation, value))) if *generation == body.generation() & GENERATION => Ok(value),
             _ => Err(Error::StaleBody(body)),
         }
     }
@@ -77,17 +80,13 @@ impl<T> Index<BodyHandle> for PerBody<T> {
 }
 
 impl PerBody<Pose> {
-    /// From the renderer's records and the bodies' generations, both by slot.
-    pub fn from_records(step: u64, records: &[PoseRecord], generations: impl Iterator<Item = u32>) -> Self {
+    /// From the renderer's records, by slot.
+    pub fn from_records(step: u64, records: &[PoseRecord]) -> Self {
         let pose = |r: &PoseRecord| Pose {
             translation: Vec3::from_array(r.translation),
             rotation: Quat::from_array(r.rotation),
         };
-        let values = records
-            .iter()
-            .zip(generations)
-            .map(|(r, g)| (r.flags & body_flags::KIND != 0).then(|| (g, pose(r))))
-            .collect();
+        let values = records.iter().map(|r| (r.tag & body_flags::KIND != 0).then(|| (r.tag >> 8, pose(r)))).collect();
         Self { step, values }
     }
 }
@@ -99,8 +98,10 @@ impl PerBody<Velocity> {
             linear: Vec3::from_array(s.linear_velocity),
             angular: Vec3::from_array(s.angular_velocity),
         };
-        let values =
-            states.iter().map(|s| (s.flags & body_flags::KIND != 0).then(|| (s.generation, velocity(s)))).collect();
+        let values = states
+            .iter()
+            .map(|s| (s.flags & body_flags::KIND != 0).then(|| (s.generation & GENERATION, velocity(s))))
+            .collect();
         Self { step, values }
     }
 }

@@ -160,7 +160,7 @@ fn attach_moves_the_other_colliders() {
     let packed = PackedScene::new(editor.scene()).unwrap();
     let batch = editor.take();
     assert_grouped(&batch);
-    let expected = [(edit_op::PROPS, 0), (edit_op::COLLIDER_MOVE, 0), (edit_op::COLLIDER, 4)];
+    let expected = [(edit_op::PROPS, 0), (edit_op::COLLIDER, 0), (edit_op::COLLIDER, 4)];
     assert_eq!(ops(&batch), expected);
     let props: BodyProps = data(&batch.records[0]);
     assert_eq!(props, packed.props[0]);

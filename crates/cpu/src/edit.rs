@@ -31,9 +31,8 @@ pub fn apply(range: EditRange, records: &[EditRecord], step: u32, targets: &mut 
 
 fn apply_to_collider(record: &EditRecord, step: u32, collider: &mut Collider) {
     let words: [[u32; 4]; 4] = [record.data[0], record.data[1], record.data[2], record.data[3]];
-    let born = if record.op == edit_op::COLLIDER_MOVE { collider.born } else { step };
     *collider = bytemuck::cast(words);
-    collider.born = born;
+    collider.born = step;
 }
 
 fn apply_to_body(record: &EditRecord, state: &mut BodyState, props: &mut BodyProps) {

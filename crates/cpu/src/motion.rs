@@ -3,7 +3,7 @@
 use crate::bounds::{STATE_LIMIT, moves};
 use crate::math::{finite, quat, rotate, rotate_back, vec3};
 use glam::{Quat, Vec3};
-use tumble_core::layout::{BodyProps, BodyState, PoseRecord, SolverBody, StepParams, body_flags};
+use tumble_core::layout::{BodyProps, BodyState, SolverBody, StepParams, body_flags};
 
 /// Largest turn of a body in a sub-step, rad; it bounds the number of pieces of a turn.
 pub const MAX_TURN: f32 = 32.0;
@@ -141,11 +141,4 @@ pub fn commit(body: &SolverBody, state: &BodyState) -> (BodyState, bool) {
         new.angular_velocity = [0.0; 3];
     }
     (new, !good)
-}
-
-/// The body's own frame, for users and renderers.
-pub fn pose(state: &BodyState, props: &BodyProps) -> PoseRecord {
-    let rotation = (quat(state.rotation) * quat(props.frame).conjugate()).normalize();
-    let translation = vec3(state.position) - rotate(rotation, vec3(props.center_of_mass));
-    PoseRecord { translation: translation.to_array(), flags: state.flags, rotation: rotation.to_array() }
 }

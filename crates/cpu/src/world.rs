@@ -98,7 +98,7 @@ impl World {
         let adapter = format!("{}, {} threads", std::env::consts::ARCH, pool.current_num_threads());
         let mut kept = Kept {
             control: Control::zeroed(),
-            poses: packed.states.iter().zip(&packed.props).map(|(s, p)| motion::pose(s, p)).collect(),
+            poses: packed.states.iter().zip(&packed.props).map(|(s, p)| PoseRecord::of(s, p)).collect(),
             states: packed.states,
             props: packed.props,
             colliders: packed.colliders,
@@ -174,8 +174,7 @@ impl World {
 
     /// All poses after the last step.
     pub fn poses(&mut self) -> Result<Poses> {
-        let generations = self.kept.states.iter().map(|s| s.generation);
-        Ok(Poses::from_records(self.kept.control.step as u64, &self.kept.poses, generations))
+        Ok(Poses::from_records(self.kept.control.step as u64, &self.kept.poses))
     }
 
     /// The newest finished poses.
@@ -215,9 +214,8 @@ impl World {
     fn grow(&mut self, overflow: Overflow) -> Result<()> {
         let Overflow { buffer, needed, capacity } = overflow;
         let error = Error::Capacity { buffer, needed, capacity };
-        let bytes_each = size_of::<Manifold>().max(4 * size_of::<ConstraintPoint>()) as u64;
         let room = limits::grown(needed);
-        let fits = room * bytes_each <= self.params.capacities.max_array_bytes;
+        let fits = room * limits::BYTES_A_PAIR <= self.params.capacities.max_array_bytes;
         if buffer != "pairs" || !self.params.capacities.grow || !fits {
             return Err(error);
         }
@@ -408,7 +406,7 @@ impl Kept {
             }
         }
         self.states = committed.into_iter().map(|(state, _)| state).collect();
-        self.poses = self.states.iter().zip(&self.props).map(|(s, p)| motion::pose(s, p)).collect();
+        self.poses = self.states.iter().zip(&self.props).map(|(s, p)| PoseRecord::of(s, p)).collect();
         self.pairs = matched.pairs;
         control.frozen_count = self
             .states

@@ -15,6 +15,7 @@ static NEXT_GENERATION: AtomicU64 = AtomicU64::new(1);
 #[derive(Debug, Default)]
 pub struct Buffers {
     named: HashMap<&'static str, Named>,
+    aliases: HashMap<&'static str, &'static str>,
     generation: u64,
 }
 
@@ -83,12 +84,18 @@ impl Buffers {
         Ok(())
     }
 
+    /// Lets `alias` name the buffer `name` too, for a shader that sees the same bytes as something else.
+    pub fn alias(&mut self, alias: &'static str, name: &'static str) {
+        self.aliases.insert(alias, name);
+    }
+
     fn insert(&mut self, name: &'static str, named: Named) {
         self.generation = NEXT_GENERATION.fetch_add(1, Ordering::Relaxed);
         self.named.insert(name, Named { generation: self.generation, ..named });
     }
 
     fn get(&self, name: &str) -> Result<&Named> {
+        let name = self.aliases.get(name).copied().unwrap_or(name);
         let missing = || Error::Gpu { what: format!("buffer `{name}`"), message: "it was never created".into() };
         self.named.get(name).ok_or_else(missing)
     }

@@ -233,10 +233,9 @@ fn first_that_opens(asked: &str, adapters: &[wgpu::Adapter]) -> Result<Gpu> {
             max_storage_buffer_binding_size: available.max_storage_buffer_binding_size,
             ..Limits::default().or_worse_values_from(&available)
         };
-        let optional = Features::TIMESTAMP_QUERY | Features::TIMESTAMP_QUERY_INSIDE_PASSES;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("tumble"),
-            required_features: adapter.features() & optional,
+            required_features: adapter.features() & Features::TIMESTAMP_QUERY,
             required_limits,
             ..Default::default()
         };

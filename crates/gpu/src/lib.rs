@@ -4,13 +4,24 @@
 //! name, [`Buffers`] holds what has those names, and a [`Recorder`] records dispatches. The parts under [`primitives`]
 //! work alone, on a user's own buffers.
 
+mod batch;
+mod bounds;
+mod broadphase;
 pub mod buffers;
+mod contact;
 pub mod device;
+mod edit;
+mod motion;
+mod narrowphase;
 pub mod pipelines;
 pub mod primitives;
 pub mod readback;
 pub mod recorder;
+mod solver;
+mod stages;
+mod store;
 mod timer;
+mod world;
 
 pub use buffers::Buffers;
 pub use device::Gpu;
@@ -18,3 +29,4 @@ pub use pipelines::{Pass, Pipelines, Shader};
 pub use readback::Readback;
 pub use recorder::{Bind, BindCache, Recorder};
 pub use timer::Timer;
+pub use world::World;

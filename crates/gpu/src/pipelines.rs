@@ -3,8 +3,8 @@
 //! Each shader is composed, parsed and validated once, and told apart by entry point: which globals an entry point
 //! uses makes its bind group layout, so nothing about bindings is written down twice.
 
-use std::borrow::Cow;
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::num::NonZeroU64;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -32,6 +32,7 @@ pub struct Binding {
 #[derive(Debug, Clone)]
 pub struct Shader {
     stem: String,
+    text: String,
     module: naga::Module,
     info: naga::valid::ModuleInfo,
 }
@@ -55,7 +56,7 @@ impl Shader {
             let line = invalid.location(&composed.source).map(|place| place.line_number);
             error(line, causes(invalid.as_inner()))
         })?;
-        Ok(Self { stem: composed.stem.clone(), module, info })
+        Ok(Self { stem: composed.stem.clone(), text: composed.source.clone(), module, info })
     }
 
     /// The module, for translating it.
@@ -173,12 +174,14 @@ impl Pipelines {
         if let Some(pass) = self.passes.get(&key) {
             return Ok(Arc::clone(pass));
         }
-        if !self.shaders.contains_key(stem) {
-            let refuse = |message| Error::Gpu { what: format!("shader {stem}"), message };
-            let composed = tumble_shaders::compose(stem).map_err(|error| refuse(error.to_string()))?;
-            self.shaders.insert(stem.to_owned(), load(gpu, Shader::parse(&composed)?)?);
-        }
-        let Some(loaded) = self.shaders.get(stem) else { unreachable!("inserted above") };
+        let loaded = match self.shaders.entry(stem.to_owned()) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => {
+                let refuse = |message| Error::Gpu { what: format!("shader {stem}"), message };
+                let composed = tumble_shaders::compose(stem).map_err(|error| refuse(error.to_string()))?;
+                entry.insert(load(gpu, Shader::parse(&composed)?)?)
+            }
+        };
         let pass = Arc::new(build(gpu, loaded, entry, self.permute)?);
         self.passes.insert(key, Arc::clone(&pass));
         Ok(pass)
@@ -186,7 +189,7 @@ impl Pipelines {
 }
 
 fn load(gpu: &Gpu, shader: Shader) -> Result<Loaded> {
-    let source = wgpu::ShaderSource::Naga(Cow::Owned(shader.module.clone()));
+    let source = wgpu::ShaderSource::Wgsl(shader.text.as_str().into());
     let descriptor = wgpu::ShaderModuleDescriptor { label: Some(&shader.stem), source };
     let module = gpu.scoped(&format!("shader {}", shader.stem), || gpu.device.create_shader_module(descriptor))?;
     Ok(Loaded { shader, module })

@@ -1,17 +1,61 @@
 //! Reading back without waiting: a ring of staging buffers, mapped when the copy into them has run.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
 
 use tumble_core::{Error, Result};
 use wgpu::{BufferUsages, CommandEncoder, MapMode, PollType, SubmissionIndex};
 
 use crate::device::Gpu;
 
-const PENDING: u8 = 0;
-const MAPPED: u8 = 1;
-const FAILED: u8 = 2;
+/// How long a copy that has run may take to be told of: its callback may be in another thread's hands.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Pending,
+    Mapped,
+    Failed,
+    /// The commands were dropped before they were submitted.
+    Dropped,
+}
+
+/// What became of a mapping. The callback runs in whichever thread polls the device first.
+#[derive(Debug)]
+struct Arrival {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+impl Arrival {
+    fn set(&self, state: State) {
+        let mut current = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        if *current == State::Pending {
+            *current = state;
+            self.changed.notify_all();
+        }
+    }
+
+    fn state(&self) -> State {
+        *self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn wait(&self) {
+        let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        // An answer later than that reads as none.
+        drop(self.changed.wait_timeout_while(state, PATIENCE, |state| *state == State::Pending));
+    }
+}
+
+/// Held by the callback: a callback that is dropped unheard says so.
+struct Signal(Arc<Arrival>);
+
+impl Drop for Signal {
+    fn drop(&mut self) {
+        self.0.set(State::Dropped);
+    }
+}
 
 /// Copies of a small buffer on their way to the host, oldest first.
 #[derive(Debug)]
@@ -25,7 +69,7 @@ pub struct Readback {
 #[derive(Debug)]
 struct Flight {
     buffer: wgpu::Buffer,
-    state: Arc<AtomicU8>,
+    arrival: Arc<Arrival>,
     submission: Option<SubmissionIndex>,
 }
 
@@ -55,17 +99,17 @@ impl Readback {
     pub fn copy(&mut self, encoder: &mut CommandEncoder, source: &wgpu::Buffer, offset: u64) -> bool {
         let Some(buffer) = self.free.pop() else { return false };
         encoder.copy_buffer_to_buffer(source, offset, &buffer, 0, self.bytes);
-        let state = Arc::new(AtomicU8::new(PENDING));
-        let seen = Arc::clone(&state);
+        let arrival = Arc::new(Arrival { state: Mutex::new(State::Pending), changed: Condvar::new() });
+        let signal = Signal(Arc::clone(&arrival));
         encoder.map_buffer_on_submit(&buffer, MapMode::Read, .., move |result| {
-            seen.store(if result.is_ok() { MAPPED } else { FAILED }, Ordering::Release);
+            signal.0.set(if result.is_ok() { State::Mapped } else { State::Failed });
         });
-        self.flying.push_back(Flight { buffer, state, submission: None });
+        self.flying.push_back(Flight { buffer, arrival, submission: None });
         true
     }
 
-    /// Tells in which submission the copies recorded since the last call went out, so that [`Readback::wait_take`] waits
-    /// for that one and for no later one.
+    /// Tells in which submission the copies recorded since the last call went out: [`Readback::wait_take`] waits for
+    /// that one and for no later one, and not at all for a copy of which it was not told.
     pub fn submitted(&mut self, index: &SubmissionIndex) {
         for flight in self.flying.iter_mut().filter(|flight| flight.submission.is_none()) {
             flight.submission = Some(index.clone());
@@ -90,7 +134,10 @@ impl Readback {
     /// [`Error::DeviceLost`] when the copy will never arrive, [`Error::Gpu`] when it was never submitted.
     pub fn wait_take(&mut self, gpu: &Gpu) -> Result<Option<Vec<u8>>> {
         let Some(flight) = self.flying.front() else { return Ok(None) };
-        gpu.poll(PollType::Wait { submission_index: flight.submission.clone(), timeout: None })?;
+        if flight.submission.is_some() {
+            gpu.poll(PollType::Wait { submission_index: flight.submission.clone(), timeout: None })?;
+            flight.arrival.wait();
+        }
         match self.take(gpu)? {
             Some(bytes) => Ok(Some(bytes)),
             None => {
@@ -102,9 +149,9 @@ impl Readback {
 
     fn take(&mut self, gpu: &Gpu) -> Result<Option<Vec<u8>>> {
         let Some(flight) = self.flying.front() else { return Ok(None) };
-        match flight.state.load(Ordering::Acquire) {
-            PENDING => Ok(None),
-            MAPPED => {
+        match flight.arrival.state() {
+            State::Pending => Ok(None),
+            State::Mapped => {
                 let view = flight.buffer.get_mapped_range(..self.bytes);
                 let bytes = view.map(|view| view.to_vec());
                 flight.buffer.unmap();
@@ -114,7 +161,12 @@ impl Readback {
                 let what = || format!("read-back of `{}`", self.name);
                 bytes.map(Some).map_err(|error| Error::Gpu { what: what(), message: error.to_string() })
             }
-            _ => {
+            State::Dropped => {
+                self.drop_oldest(gpu);
+                let what = format!("read-back of `{}`", self.name);
+                Err(Error::Gpu { what, message: "its commands were never submitted".into() })
+            }
+            State::Failed => {
                 self.drop_oldest(gpu);
                 gpu.check()?;
                 Err(Error::DeviceLost { reason: format!("the read-back of `{}` could not be mapped", self.name) })

@@ -211,15 +211,17 @@ impl<'a> Recorder<'a> {
 
     fn prepare(&mut self, pass: &Pass, overrides: &[Bind]) -> Result<&mut ComputePass<'static>> {
         let group = self.cache.group(self.gpu, self.buffers, pass, overrides)?;
-        if self.compute.is_none() {
-            let stage = self.stage.unwrap_or("other");
-            let timestamp_writes = self.timer.as_mut().and_then(|timer| timer.stage(stage));
-            let descriptor = wgpu::ComputePassDescriptor { label: Some(stage), timestamp_writes };
-            // The encoder is not touched before the pass ends, which `encoder` and `submit` see to.
-            self.compute = Some(self.encoder.begin_compute_pass(&descriptor).forget_lifetime());
-            self.pipeline = None;
-        }
-        let Some(compute) = self.compute.as_mut() else { unreachable!("begun above") };
+        let compute = match &mut self.compute {
+            Some(compute) => compute,
+            none => {
+                let stage = self.stage.unwrap_or("other");
+                let timestamp_writes = self.timer.as_mut().and_then(|timer| timer.stage(stage));
+                let descriptor = wgpu::ComputePassDescriptor { label: Some(stage), timestamp_writes };
+                self.pipeline = None;
+                // The encoder is not touched before the pass ends, which `encoder` and `submit` see to.
+                none.insert(self.encoder.begin_compute_pass(&descriptor).forget_lifetime())
+            }
+        };
         if self.pipeline != Some(pass.id) {
             compute.set_pipeline(&pass.pipeline);
             self.pipeline = Some(pass.id);

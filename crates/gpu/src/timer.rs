@@ -95,15 +95,32 @@ impl Timer {
                 return Err(error);
             }
         };
-        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&bytes);
-        let mut times: Vec<StageTime> = Vec::new();
-        for (stage, span) in self.flying.pop_front().unwrap_or_default().into_iter().zip(ticks.chunks_exact(2)) {
-            let spent = span[1].saturating_sub(span[0]) as f64 * self.nanoseconds_per_tick * 1e-6;
-            match times.iter_mut().find(|time| time.stage == stage) {
-                Some(time) => time.milliseconds = time.milliseconds.map(|sum| sum + spent),
-                None => times.push(StageTime { stage, milliseconds: Some(spent) }),
-            }
+        let stages = self.flying.pop_front().unwrap_or_default();
+        Ok(Some(add_up(&stages, &bytemuck::pod_collect_to_vec(&bytes), self.nanoseconds_per_tick)))
+    }
+}
+
+/// Time of each stage, in the order of their first appearance, from two timestamps for each time that it ran.
+fn add_up(stages: &[&'static str], ticks: &[u64], nanoseconds_per_tick: f64) -> Vec<StageTime> {
+    let mut times: Vec<StageTime> = Vec::new();
+    for (stage, span) in stages.iter().zip(ticks.chunks_exact(2)) {
+        let spent = span[1].saturating_sub(span[0]) as f64 * nanoseconds_per_tick * 1e-6;
+        match times.iter_mut().find(|time| time.stage == *stage) {
+            Some(time) => time.milliseconds = time.milliseconds.map(|sum| sum + spent),
+            None => times.push(StageTime { stage, milliseconds: Some(spent) }),
         }
-        Ok(Some(times))
+    }
+    times
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_of_a_stage_add_up() {
+        let times = add_up(&["a", "b", "a"], &[1_000_000, 2_000_000, 2_000_000, 5_000_000, 5_000_000, 9_000_000], 0.5);
+        let expected = [("a", 2.5), ("b", 1.5)].map(|(stage, ms)| StageTime { stage, milliseconds: Some(ms) });
+        assert_eq!(times, expected);
     }
 }

@@ -1,4 +1,5 @@
 use bytemuck::{Pod, Zeroable};
+use glam::{Quat, Vec3};
 
 /// Bits of [`BodyState::flags`].
 pub mod body_flags {
@@ -107,8 +108,30 @@ pub struct SolverBody {
 pub struct PoseRecord {
     /// Origin of the body's own frame in the world, m.
     pub translation: [f32; 3],
-    /// [`body_flags`]; zero when the slot is empty.
-    pub flags: u32,
+    /// [`body_flags`] in the low eight bits, zero when the slot is empty; the handle's generation above.
+    pub tag: u32,
     /// Body's own frame to world, unit quaternion x y z w.
     pub rotation: [f32; 4],
+}
+
+/// The tag of a pose: flags and generation.
+pub const fn pose_tag(flags: u32, generation: u32) -> u32 {
+    flags | generation << 8
+}
+
+impl PoseRecord {
+    /// The body's own frame, from its principal frame at the centre of mass.
+    pub fn of(state: &BodyState, props: &BodyProps) -> Self {
+        let rotation = (Quat::from_array(state.rotation) * Quat::from_array(props.frame).conjugate()).normalize();
+        let translation = Vec3::from_array(state.position) - rotate(rotation, Vec3::from_array(props.center_of_mass));
+        let tag = pose_tag(state.flags, state.generation);
+        Self { translation: translation.to_array(), tag, rotation: rotation.to_array() }
+    }
+}
+
+/// Rotates `v` by `q`, in the order of the shaders.
+fn rotate(q: Quat, v: Vec3) -> Vec3 {
+    let b = Vec3::new(q.x, q.y, q.z);
+    let t = 2.0 * b.cross(v);
+    v + q.w * t + b.cross(t)
 }

@@ -26,10 +26,8 @@ pub mod edit_op {
     pub const FREEZE: u32 = 10;
     /// A collider is written: data\[0..4\] its 64 bytes, `born` excepted, which is the step's number.
     pub const COLLIDER: u32 = 11;
-    /// Like `COLLIDER` for one that lived before: its contacts stay.
-    pub const COLLIDER_MOVE: u32 = 12;
     /// The collider is gone.
-    pub const COLLIDER_REMOVE: u32 = 13;
+    pub const COLLIDER_REMOVE: u32 = 12;
 }
 
 /// One edit. 128 bytes.

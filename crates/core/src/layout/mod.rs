@@ -11,7 +11,7 @@ mod edit;
 mod manifold;
 mod step;
 
-pub use body::{BodyProps, BodyState, PoseRecord, SolverBody, body_flags};
+pub use body::{BodyProps, BodyState, PoseRecord, SolverBody, body_flags, pose_tag};
 pub use collider::{Aabb, Collider, aabb_body, shape_kind};
 pub use constraint::{ConstraintHead, ConstraintPoint, Impulse};
 pub use control::{BATCHES, Control, LAST_BATCH, QUARANTINE_NAMES, UNBATCHED, overflow};

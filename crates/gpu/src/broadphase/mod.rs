@@ -1,0 +1,3 @@
+//! Stage `broadphase`: which colliders' boxes overlap.
+
+pub(crate) mod grid;

@@ -1,0 +1,67 @@
+//! The stages of a step, in order.
+
+use crate::batch::Batch;
+use crate::bounds::Bounds;
+use crate::broadphase::grid::Grid;
+use crate::contact::Contact;
+use crate::edit::Edit;
+use crate::motion::Motion;
+use crate::narrowphase::Narrowphase;
+use crate::solver::Solver;
+use crate::store::Sizes;
+use crate::{Buffers, Gpu, Pipelines, Recorder};
+use tumble_core::layout::StepParams;
+use tumble_core::{Plan, Result};
+
+/// Every stage that the plan needs, made for arrays of these sizes.
+pub(crate) struct Stages {
+    edit: Edit,
+    bounds: Bounds,
+    grid: Grid,
+    contact: Contact,
+    narrowphase: Narrowphase,
+    batch: Batch,
+    solver: Solver,
+    motion: Motion,
+}
+
+impl Stages {
+    pub(crate) fn new(gpu: &Gpu, pipelines: &mut Pipelines, sizes: &Sizes, plan: &Plan) -> Result<Self> {
+        Ok(Self {
+            edit: Edit::new(gpu, pipelines)?,
+            bounds: Bounds::new(gpu, pipelines)?,
+            grid: Grid::new(gpu, pipelines, sizes)?,
+            contact: Contact::new(gpu, pipelines, sizes)?,
+            narrowphase: Narrowphase::new(gpu, pipelines, plan)?,
+            batch: Batch::new(gpu, pipelines, sizes)?,
+            solver: Solver::new(gpu, pipelines, plan)?,
+            motion: Motion::new(gpu, pipelines)?,
+        })
+    }
+
+    /// Bytes of the stages' own scratch.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.grid.bytes() + self.batch.bytes()
+    }
+
+    /// Tells stages what they must know on the host before the step is submitted.
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, step: &StepParams) -> Result<()> {
+        self.grid.prepare(gpu, step)
+    }
+
+    /// Records one step: the plan phase up to the second gate, then the commit phase, whose passes do nothing once the
+    /// stop flag is up.
+    pub(crate) fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
+        self.edit.record(recorder, step)?;
+        self.bounds.record(recorder, step)?;
+        self.grid.record(recorder, buffers, step)?;
+        self.contact.record_match(recorder, buffers)?;
+        self.narrowphase.record(recorder, self.contact.a_pair())?;
+        self.batch.record(recorder, buffers, step, self.contact.a_pair())?;
+
+        self.solver.record(recorder, buffers, &self.motion, step)?;
+        self.contact.record_commit(recorder, buffers)?;
+        self.motion.record_commit(recorder, step)?;
+        self.contact.record_counts(recorder)
+    }
+}

@@ -1,0 +1,161 @@
+//! The buffers of a world: names, elements, sizes. Each name is that of a global in the shaders.
+
+use crate::{Bind, Buffers, Gpu};
+use bytemuck::Zeroable;
+use tumble_core::layout::{
+    Aabb, BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Control, EditRange, EditRecord,
+    FoundManifold, Impulse, Manifold, Pair, PoseRecord, SolverBody, StepParams,
+};
+use tumble_core::{PackedScene, Result, limits};
+use wgpu::BufferUsages;
+
+/// Words of `counters`, for passes that take a count from there.
+pub(crate) mod word {
+    use std::mem::offset_of;
+    use tumble_core::layout::Control;
+
+    pub(crate) const OLD_PAIR_COUNT: u32 = offset_of!(Control, old_pair_count) as u32 / 4;
+    pub(crate) const PAIR_COUNT: u32 = offset_of!(Control, pair_count) as u32 / 4;
+    pub(crate) const NEW_COUNT: u32 = offset_of!(Control, new_count) as u32 / 4;
+    pub(crate) const DEAD_COUNT: u32 = offset_of!(Control, dead_count) as u32 / 4;
+    pub(crate) const UNPLACED: u32 = offset_of!(Control, unplaced) as u32 / 4;
+}
+
+/// Bytes in `dispatch_args` where the arguments of the commit phase lie.
+pub(crate) mod args {
+    /// One thread a constraint of this batch.
+    pub(crate) const fn batch(index: u32) -> u64 {
+        16 * index as u64
+    }
+    /// One workgroup if batches without a dispatch of their own have constraints.
+    pub(crate) const TAIL: u64 = 16 * 63;
+    /// One thread a constraint.
+    pub(crate) const CONSTRAINTS: u64 = 16 * 64;
+    /// One thread a pair.
+    pub(crate) const PAIRS: u64 = 16 * 65;
+    /// One thread a pair that is gone, or new.
+    pub(crate) const DEAD: u64 = 16 * 66;
+    /// All.
+    pub(crate) const COUNT: u64 = 67;
+}
+
+/// How many elements the arrays of a world have room for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Sizes {
+    pub(crate) bodies: u32,
+    pub(crate) colliders: u32,
+    pub(crate) pairs: u32,
+}
+
+impl Sizes {
+    /// Entries of the cell table, the end included.
+    pub(crate) fn cells(&self) -> u32 {
+        (1 << limits::cell_table_bits(self.colliders)) + 1
+    }
+}
+
+/// Which count an array follows.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Per {
+    Body,
+    Collider,
+    Cell,
+    Pair,
+}
+
+/// Name, bytes of an element, what it follows, whether its content outlives a step.
+const ARRAYS: [(&str, usize, Per, bool); 33] = [
+    ("states", size_of::<BodyState>(), Per::Body, true),
+    ("work_states", size_of::<BodyState>(), Per::Body, false),
+    ("props", size_of::<BodyProps>(), Per::Body, true),
+    ("poses", size_of::<PoseRecord>(), Per::Body, true),
+    ("solver_bodies", size_of::<SolverBody>(), Per::Body, false),
+    ("masks", 8, Per::Body, false),
+    ("claims", 4, Per::Body, false),
+    ("colliders", size_of::<Collider>(), Per::Collider, true),
+    ("aabbs", size_of::<Aabb>(), Per::Collider, false),
+    ("cell_entries", 4, Per::Collider, false),
+    ("large_list", 4, Per::Collider, false),
+    ("partner_offset", 4, Per::Collider, false),
+    ("cell_start", 4, Per::Cell, false),
+    ("cell_cursor", 4, Per::Cell, false),
+    ("pairs", size_of::<Pair>(), Per::Pair, true),
+    ("next_pairs", size_of::<Pair>(), Per::Pair, false),
+    ("free_slots", 4, Per::Pair, true),
+    ("batch_of_slot", 4, Per::Pair, true),
+    ("slot_impulses", 4 * size_of::<Impulse>(), Per::Pair, true),
+    ("found_manifolds", size_of::<FoundManifold>(), Per::Pair, true),
+    ("pair_keys", 8, Per::Pair, false),
+    ("pair_values", 4, Per::Pair, false),
+    ("dead_rank", 4, Per::Pair, false),
+    ("dead_slots", 4, Per::Pair, false),
+    ("fresh_rank", 4, Per::Pair, false),
+    ("manifolds", size_of::<Manifold>(), Per::Pair, false),
+    ("pair_batch", 4, Per::Pair, false),
+    ("unplaced", 4, Per::Pair, false),
+    ("batch_keys", 4, Per::Pair, false),
+    ("batch_order", 4, Per::Pair, false),
+    ("heads", size_of::<ConstraintHead>(), Per::Pair, false),
+    ("points", 4 * size_of::<ConstraintPoint>(), Per::Pair, false),
+    ("impulses", 4 * size_of::<Impulse>(), Per::Pair, false),
+];
+
+/// Part `index` of the buffer that holds the numbers 0 to 63, as the uniform `name`.
+pub(crate) fn index_part<'a>(name: &'a str, buffers: &'a Buffers, index: u32) -> Result<Bind<'a>> {
+    Ok(Bind::part(name, buffers.buffer("indices")?, 256 * index as u64, 16))
+}
+
+fn count(per: Per, sizes: &Sizes) -> u64 {
+    u64::from(match per {
+        Per::Body => sizes.bodies,
+        Per::Collider => sizes.colliders,
+        Per::Cell => sizes.cells(),
+        Per::Pair => sizes.pairs,
+    })
+}
+
+/// Creates every buffer and loads the scene.
+pub(crate) fn create(gpu: &Gpu, packed: &PackedScene, sizes: &Sizes) -> Result<Buffers> {
+    let mut buffers = Buffers::new();
+    let (storage, uniform) = (BufferUsages::STORAGE, BufferUsages::UNIFORM);
+    for (name, bytes, per, _) in ARRAYS {
+        let extra = if name == "poses" { BufferUsages::VERTEX } else { BufferUsages::empty() };
+        buffers.create(gpu, name, bytes as u64, count(per, sizes), storage | extra)?;
+    }
+    buffers.create(gpu, "control", size_of::<Control>() as u64, 1, storage | uniform)?;
+    buffers.alias("counters", "control");
+    buffers.create(gpu, "step", size_of::<StepParams>() as u64, 1, uniform)?;
+    buffers.create(gpu, "class_histogram", 4, 1024, storage)?;
+    buffers.create(gpu, "dispatch_args", 16, args::COUNT, storage | BufferUsages::INDIRECT)?;
+    buffers.create(gpu, "edit_records", size_of::<EditRecord>() as u64, 256, storage)?;
+    buffers.create(gpu, "edit_ranges", size_of::<EditRange>() as u64, 256, storage)?;
+    buffers.create(gpu, "indices", 256, 64, uniform)?;
+    let indices: Vec<u32> = (0..64 * 64).map(|i| if i % 64 == 0 { i / 64 } else { 0 }).collect();
+    let write = |name: &str, bytes: &[u8]| -> Result<()> {
+        gpu.queue.write_buffer(buffers.buffer(name)?, 0, bytes);
+        Ok(())
+    };
+    write("indices", bytemuck::cast_slice(&indices))?;
+    write("states", bytemuck::cast_slice(&packed.states))?;
+    write("props", bytemuck::cast_slice(&packed.props))?;
+    write("colliders", bytemuck::cast_slice(&packed.colliders))?;
+    // Lowest slots on top of the stack.
+    let free: Vec<u32> = (0..sizes.pairs).rev().collect();
+    write("free_slots", bytemuck::cast_slice(&free))?;
+    let control = Control { free_count: sizes.pairs, ..Control::zeroed() };
+    write("control", bytemuck::bytes_of(&control))?;
+    Ok(buffers)
+}
+
+/// Makes room; what outlives a step is kept. The free list is not: see [`write_free`].
+pub(crate) fn grow(gpu: &Gpu, buffers: &mut Buffers, sizes: &Sizes) -> Result<()> {
+    ARRAYS.iter().try_for_each(|(name, _, per, lasting)| buffers.grow(gpu, name, count(*per, sizes), *lasting))
+}
+
+/// Puts the slots from `old` on below those that were on the free list.
+pub(crate) fn write_free(gpu: &Gpu, buffers: &Buffers, was: &[u32], old: u32, sizes: &Sizes) -> Result<u32> {
+    let mut free: Vec<u32> = (old..sizes.pairs).rev().collect();
+    free.extend_from_slice(was);
+    gpu.queue.write_buffer(buffers.buffer("free_slots")?, 0, bytemuck::cast_slice(&free));
+    Ok(free.len() as u32)
+}

@@ -1,0 +1,417 @@
+//! A world on the GPU: submission, the ring of statuses, growth and the edit log.
+
+use crate::readback::{Readback, read_now};
+use crate::stages::Stages;
+use crate::store::{self, Sizes};
+use crate::{BindCache, Buffers, Gpu, Pipelines, Recorder, Timer};
+use bytemuck::Zeroable;
+use std::collections::VecDeque;
+use tumble_core::edit::EditBatch;
+use tumble_core::layout::{BodyState, Control, PoseRecord, StepParams, overflow};
+use tumble_core::{Editor, Error, Params, Plan, Poses, Result, Scene, StageTime, StepReport, Velocities, limits};
+
+/// Steps in flight before `step` waits.
+const IN_FLIGHT: usize = 3;
+/// Batches with a dispatch of their own as long as no report has told how many there are.
+const WIDE_BATCHES: u32 = 24;
+
+/// A simulation on a GPU.
+///
+/// Steps are submitted and not waited for; each leaves a status that comes back on its own. A step that finds a buffer
+/// too small raises a flag: neither it nor the ones behind it commit anything. When its status arrives, the buffer is
+/// made larger and those steps run again, edits included.
+pub struct World {
+    gpu: Gpu,
+    editor: Editor,
+    params: Params,
+    pipelines: Pipelines,
+    buffers: Buffers,
+    stages: Stages,
+    sizes: Sizes,
+    built: Plan,
+    cache: BindCache,
+    timer: Option<Timer>,
+    statuses: Readback,
+    pose_copies: Readback,
+    step_copies: Readback,
+    newest_poses: Option<Poses>,
+    /// Submitted steps whose status has not come, oldest first.
+    flying: VecDeque<Record>,
+    /// Steps to run again once there is room.
+    waiting: VecDeque<Record>,
+    submitted: u32,
+    last: Control,
+    /// Batches that the step of this number had, for the last few.
+    batches: VecDeque<(u32, u32)>,
+    stage_times: Vec<StageTime>,
+    growths: Vec<(&'static str, u32)>,
+    drop_pair: u32,
+}
+
+/// All that a step needs to be run, and run again.
+struct Record {
+    step: StepParams,
+    edits: EditBatch,
+    plan: Plan,
+}
+
+impl World {
+    /// Loads a scene onto the best adapter there is, a software one too.
+    ///
+    /// # Errors
+    /// What is wrong with the scene or the parameters; [`Error::NoAdapter`]; [`Error::Limits`] and
+    /// [`Error::OutOfMemory`] when the adapter is too small for the scene.
+    pub fn new(scene: Scene, params: Params) -> Result<Self> {
+        Self::with_gpu(Gpu::any()?, scene, params)
+    }
+
+    /// Loads a scene onto a user's own device, for example a renderer's. The device keeps its handlers.
+    ///
+    /// # Errors
+    /// As for [`World::new`].
+    pub fn with_device(device: wgpu::Device, queue: wgpu::Queue, scene: Scene, params: Params) -> Result<Self> {
+        Self::with_gpu(Gpu::from_device(device, queue), scene, params)
+    }
+
+    /// Loads a scene onto this device.
+    ///
+    /// # Errors
+    /// As for [`World::new`].
+    pub fn with_gpu(gpu: Gpu, scene: Scene, params: Params) -> Result<Self> {
+        Self::with_pipelines(gpu, Pipelines::new(), scene, params)
+    }
+
+    /// For tests: with passes that run in another order.
+    #[doc(hidden)]
+    pub fn with_pipelines(gpu: Gpu, mut pipelines: Pipelines, scene: Scene, params: Params) -> Result<Self> {
+        params.validate()?;
+        let (editor, packed) = Editor::new(scene)?;
+        let (bodies, colliders) = (packed.states.len() as u32, packed.colliders.len() as u32);
+        let pairs = limits::initial_pairs(&params.capacities, colliders);
+        let sizes = Sizes { bodies: bodies.max(1), colliders: colliders.max(1), pairs };
+        let buffers = store::create(&gpu, &packed, &sizes)?;
+        let poses: Vec<PoseRecord> =
+            packed.states.iter().zip(&packed.props).map(|(s, p)| PoseRecord::of(s, p)).collect();
+        gpu.queue.write_buffer(buffers.buffer("poses")?, 0, bytemuck::cast_slice(&poses));
+        let stages = Stages::new(&gpu, &mut pipelines, &sizes, &packed.plan)?;
+        let timer = if params.profile { Timer::new(&gpu)? } else { None };
+        let control_bytes = size_of::<Control>() as u64;
+        Ok(Self {
+            statuses: Readback::new(&gpu, "status", control_bytes, IN_FLIGHT)?,
+            pose_copies: Readback::new(&gpu, "pose copy", pose_bytes(&sizes), 1)?,
+            step_copies: Readback::new(&gpu, "step copy", control_bytes, 1)?,
+            newest_poses: None,
+            flying: VecDeque::new(),
+            waiting: VecDeque::new(),
+            submitted: 0,
+            last: Control::zeroed(),
+            batches: VecDeque::new(),
+            stage_times: Vec::new(),
+            growths: Vec::new(),
+            drop_pair: u32::MAX,
+            built: packed.plan,
+            cache: BindCache::new(),
+            gpu,
+            editor,
+            params,
+            pipelines,
+            buffers,
+            stages,
+            sizes,
+            timer,
+        })
+    }
+
+    /// Edits for the next step.
+    pub fn edit(&mut self) -> &mut Editor {
+        &mut self.editor
+    }
+
+    /// The scene as edited so far; poses in it are those at insertion.
+    pub fn scene(&self) -> &Scene {
+        self.editor.scene()
+    }
+
+    /// Parameters in force.
+    pub fn params(&self) -> &Params {
+        &self.params
+    }
+
+    /// Parameters from the next step on.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] names the field.
+    pub fn set_params(&mut self, params: Params) -> Result<()> {
+        params.validate()?;
+        if params.profile && self.timer.is_none() {
+            self.timer = Timer::new(&self.gpu)?;
+        }
+        self.params = params;
+        Ok(())
+    }
+
+    /// The device, for a renderer.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// The bodies' poses on the GPU, a [`PoseRecord`] a handle slot, written at the end of each step; and a number that
+    /// changes when the buffer is replaced because the world grew. Bind it; do not write it.
+    ///
+    /// # Errors
+    /// None that a user can cause.
+    pub fn pose_buffer(&self) -> Result<(&wgpu::Buffer, u64)> {
+        Ok((self.buffers.buffer("poses")?, self.buffers.generation_of("poses")))
+    }
+
+    /// Test hook: the next step leaves out the pair of this index.
+    #[doc(hidden)]
+    pub fn drop_pair(&mut self, index: u32) {
+        self.drop_pair = index;
+    }
+
+    /// Submits one step. Waits only when three are in flight.
+    ///
+    /// # Errors
+    /// [`Error::Capacity`] when an earlier step needs more room than it may have: nothing is submitted, and the last
+    /// good state stays readable. [`Error::DeviceLost`], [`Error::OutOfMemory`] and [`Error::Gpu`] from the device.
+    pub fn step(&mut self) -> Result<()> {
+        self.run_waiting()?;
+        self.take_statuses(IN_FLIGHT - 1)?;
+        let (bodies, colliders) = (self.editor.body_slots() as u32, self.editor.collider_slots() as u32);
+        self.make_room(bodies, colliders)?;
+        let edits = self.editor.take();
+        let mut step = self.params.step_params(self.submitted + 1, self.editor.scene().gravity);
+        step.body_count = bodies;
+        step.collider_count = colliders;
+        step.edit_ranges = edits.ranges.len() as u32;
+        step.cell_table_bits = limits::cell_table_bits(colliders);
+        step.large_limit = limits::large_limit(colliders);
+        step.drop_pair = std::mem::replace(&mut self.drop_pair, u32::MAX);
+        self.submitted += 1;
+        self.submit(Record { step, edits, plan: self.editor.plan() })
+    }
+
+    /// Waits for all submitted steps; the last one's report.
+    ///
+    /// # Errors
+    /// As for [`World::step`].
+    pub fn sync(&mut self) -> Result<StepReport> {
+        self.run_waiting()?;
+        self.take_statuses(0)?;
+        Ok(self.report())
+    }
+
+    /// Waits for all submitted steps; the pose of every body, in one download.
+    ///
+    /// # Errors
+    /// As for [`World::step`]; once that was told, the last good poses.
+    pub fn poses(&mut self) -> Result<Poses> {
+        self.take_statuses(0)?;
+        let bytes = read_now(&self.gpu, self.buffers.buffer("poses")?, 0, pose_bytes(&self.sizes))?;
+        Ok(self.poses_of(self.last.step, &bytes))
+    }
+
+    /// The newest poses that have arrived, without waiting; `None` before the first have. Each call asks for new ones.
+    ///
+    /// # Errors
+    /// As for [`World::step`].
+    pub fn try_poses(&mut self) -> Result<Option<Poses>> {
+        if let Some(bytes) = self.pose_copies.try_take(&self.gpu)? {
+            let control = self.step_copies.wait_take(&self.gpu)?.unwrap_or_default();
+            self.newest_poses = Some(self.poses_of(read_control(&control).step, &bytes));
+        }
+        if self.submitted > 0 && !self.pose_copies.is_full() {
+            let (poses, control) = (self.buffers.buffer("poses")?, self.buffers.buffer("control")?);
+            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+            self.pose_copies.copy(&mut encoder, poses, 0);
+            self.step_copies.copy(&mut encoder, control, 0);
+            let index = self.gpu.scoped("a copy of the poses", || self.gpu.queue.submit([encoder.finish()]))?;
+            self.pose_copies.submitted(&index);
+            self.step_copies.submitted(&index);
+        }
+        Ok(self.newest_poses.clone())
+    }
+
+    /// Waits for all submitted steps; the velocity of every body, in one download.
+    ///
+    /// # Errors
+    /// As for [`World::poses`].
+    pub fn velocities(&mut self) -> Result<Velocities> {
+        self.take_statuses(0)?;
+        let bytes = u64::from(self.sizes.bodies) * size_of::<BodyState>() as u64;
+        let bytes = read_now(&self.gpu, self.buffers.buffer("states")?, 0, bytes)?;
+        Ok(Velocities::from_states(self.last.step.into(), &bytemuck::pod_collect_to_vec::<u8, BodyState>(&bytes)))
+    }
+
+    fn poses_of(&self, step: u32, bytes: &[u8]) -> Poses {
+        Poses::from_records(step.into(), &bytemuck::pod_collect_to_vec::<u8, PoseRecord>(bytes))
+    }
+
+    fn report(&self) -> StepReport {
+        let mut report = StepReport::from_control(&self.last);
+        report.backend = "gpu";
+        report.adapter = format!("{}, {}", self.gpu.info.name, self.gpu.info.driver_info);
+        report.bodies = self.editor.scene().len() as u32;
+        report.growths = self.growths.clone();
+        report.memory_bytes = self.buffers.bytes() + self.stages.bytes();
+        report.stages = self.stage_times.clone();
+        report
+    }
+
+    /// Records and submits one step, and its status behind it.
+    fn submit(&mut self, mut record: Record) -> Result<()> {
+        if self.built.widen(&record.plan) {
+            self.stages = Stages::new(&self.gpu, &mut self.pipelines, &self.sizes, &self.built)?;
+        }
+        let step = &mut record.step;
+        step.pair_capacity = self.sizes.pairs;
+        // The report of exactly three steps ago, so that no decision hangs on what has arrived. (It only decides which
+        // dispatch a batch is in: the bits are the same.)
+        let known = self.batches.iter().find(|(number, _)| number + IN_FLIGHT as u32 == step.step);
+        step.wide_batches = known.map_or(WIDE_BATCHES, |(_, count)| *count);
+        self.upload(&record)?;
+        self.stages.prepare(&self.gpu, &record.step)?;
+        let timer = if self.params.profile { self.timer.as_mut() } else { None };
+        let mut recorder = Recorder::new(&self.gpu, &self.buffers, &mut self.cache, timer);
+        self.stages.record(&mut recorder, &self.buffers, &record.step)?;
+        self.statuses.copy(recorder.encoder(), self.buffers.buffer("control")?, 0);
+        let index = recorder.submit()?;
+        self.statuses.submitted(&index);
+        self.flying.push_back(record);
+        Ok(())
+    }
+
+    fn upload(&mut self, record: &Record) -> Result<()> {
+        let edits = &record.edits;
+        self.buffers.grow(&self.gpu, "edit_records", (edits.records.len() as u64).next_power_of_two(), false)?;
+        self.buffers.grow(&self.gpu, "edit_ranges", (edits.ranges.len() as u64).next_power_of_two(), false)?;
+        let queue = &self.gpu.queue;
+        queue.write_buffer(self.buffers.buffer("step")?, 0, bytemuck::bytes_of(&record.step));
+        queue.write_buffer(self.buffers.buffer("edit_records")?, 0, bytemuck::cast_slice(&edits.records));
+        queue.write_buffer(self.buffers.buffer("edit_ranges")?, 0, bytemuck::cast_slice(&edits.ranges));
+        Ok(())
+    }
+
+    /// Takes statuses as they come, and waits until no more than `most` steps are in flight.
+    fn take_statuses(&mut self, most: usize) -> Result<()> {
+        while !self.flying.is_empty() {
+            let taken = if self.flying.len() > most {
+                self.statuses.wait_take(&self.gpu)?
+            } else {
+                self.statuses.try_take(&self.gpu)?
+            };
+            let Some(bytes) = taken else { break };
+            let status = read_control(&bytes);
+            if status.stop != 0 {
+                self.stopped(status)?;
+                continue;
+            }
+            if let Some(record) = self.flying.pop_front() {
+                self.batches.push_back((record.step.step, status.batch_count));
+                if self.batches.len() > 2 * IN_FLIGHT {
+                    self.batches.pop_front();
+                }
+            }
+            self.last = status;
+        }
+        if let Some(timer) = &mut self.timer {
+            while let Some(times) = timer.take(&self.gpu, most == 0)? {
+                self.stage_times = times;
+            }
+        }
+        self.gpu.check()
+    }
+
+    /// A step raised the flag: it and all behind it must run again, in a larger buffer.
+    fn stopped(&mut self, status: Control) -> Result<()> {
+        while self.statuses.in_flight() > 0 {
+            self.statuses.wait_take(&self.gpu)?;
+        }
+        self.waiting.append(&mut self.flying);
+        self.last = Control { stop: status.stop, overflow: status.overflow, needed: status.needed, ..self.last };
+        self.run_waiting()
+    }
+
+    /// Makes the room that the first waiting step needs, and submits all that wait.
+    fn run_waiting(&mut self) -> Result<()> {
+        if self.waiting.is_empty() {
+            return Ok(());
+        }
+        self.grow_pairs()?;
+        while let Some(record) = self.waiting.pop_front() {
+            self.submit(record)?;
+        }
+        Ok(())
+    }
+
+    fn grow_pairs(&mut self) -> Result<()> {
+        let needed = u64::from(self.last.needed);
+        let (buffer, capacity) = match self.last.overflow {
+            overflow::PAIRS => ("pairs", self.sizes.pairs),
+            overflow::LAST_BATCH => ("last batch", limits::LAST_LIMIT),
+            _ => ("cell", limits::CELL_LOOP_LIMIT),
+        };
+        let error = Error::Capacity { buffer, needed, capacity: capacity.into() };
+        let room = limits::grown(needed);
+        let fits = room * limits::BYTES_A_PAIR <= self.params.capacities.max_array_bytes;
+        if buffer != "pairs" || !self.params.capacities.grow || !fits || room > u64::from(u32::MAX >> 6) {
+            return Err(error);
+        }
+        let old = self.sizes.pairs;
+        let control = self.buffers.buffer("control")?;
+        let free_count: u32 = bytemuck::pod_read_unaligned(&read_now(&self.gpu, control, 20, 4)?);
+        let free = read_now(&self.gpu, self.buffers.buffer("free_slots")?, 0, 4 * u64::from(free_count))?;
+        let sizes = Sizes { pairs: room as u32, ..self.sizes };
+        // On an error some arrays are larger than they must be, and the world is as good as before.
+        store::grow(&self.gpu, &mut self.buffers, &sizes)
+            .map_err(|e| if matches!(e, Error::Capacity { .. }) { error } else { e })?;
+        self.stages = Stages::new(&self.gpu, &mut self.pipelines, &sizes, &self.built)?;
+        self.sizes = sizes;
+        let free = store::write_free(&self.gpu, &self.buffers, &bytemuck::pod_collect_to_vec(&free), old, &sizes)?;
+        let control = self.buffers.buffer("control")?;
+        self.gpu.queue.write_buffer(control, 0, bytemuck::cast_slice(&[0u32; 3]));
+        self.gpu.queue.write_buffer(control, 20, bytemuck::bytes_of(&free));
+        self.last.stop = 0;
+        self.count_growth("pairs");
+        Ok(())
+    }
+
+    /// Makes room for bodies and colliders that edits brought.
+    fn make_room(&mut self, bodies: u32, colliders: u32) -> Result<()> {
+        if bodies <= self.sizes.bodies && colliders <= self.sizes.colliders {
+            return Ok(());
+        }
+        self.take_statuses(0)?;
+        let mut sizes = self.sizes;
+        if bodies > sizes.bodies {
+            sizes.bodies = limits::grown(bodies.into()) as u32;
+            self.count_growth("bodies");
+        }
+        if colliders > sizes.colliders {
+            sizes.colliders = limits::grown(colliders.into()) as u32;
+            self.count_growth("colliders");
+        }
+        store::grow(&self.gpu, &mut self.buffers, &sizes)?;
+        self.stages = Stages::new(&self.gpu, &mut self.pipelines, &sizes, &self.built)?;
+        self.pose_copies = Readback::new(&self.gpu, "pose copy", pose_bytes(&sizes), 1)?;
+        self.step_copies = Readback::new(&self.gpu, "step copy", size_of::<Control>() as u64, 1)?;
+        self.sizes = sizes;
+        Ok(())
+    }
+
+    fn count_growth(&mut self, buffer: &'static str) {
+        match self.growths.iter_mut().find(|(name, _)| *name == buffer) {
+            Some((_, count)) => *count += 1,
+            None => self.growths.push((buffer, 1)),
+        }
+    }
+}
+
+fn pose_bytes(sizes: &Sizes) -> u64 {
+    u64::from(sizes.bodies) * size_of::<PoseRecord>() as u64
+}
+
+fn read_control(bytes: &[u8]) -> Control {
+    if bytes.len() == size_of::<Control>() { bytemuck::pod_read_unaligned(bytes) } else { Control::zeroed() }
+}

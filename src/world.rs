@@ -1,0 +1,126 @@
+//! One face for the CPU and the GPU world.
+
+use tumble_core::{Editor, Error, Params, Poses, Result, Scene, StepReport, Velocities};
+
+/// Where a world runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Backend {
+    /// A real GPU if there is one, else the CPU side; never a software adapter, which is slower than the CPU side.
+    #[default]
+    Auto,
+    /// The CPU side.
+    Cpu,
+    /// The best adapter there is, a software one too.
+    Gpu,
+}
+
+/// A simulation, on whichever side it runs; [`StepReport::backend`] and [`StepReport::adapter`] name it.
+pub enum World {
+    /// On the CPU.
+    #[cfg(feature = "cpu")]
+    Cpu(Box<tumble_cpu::World>),
+    /// On a GPU.
+    #[cfg(feature = "gpu")]
+    Gpu(Box<tumble_gpu::World>),
+}
+
+/// Calls the same method on whichever side there is.
+macro_rules! either {
+    ($self:ident, $world:ident => $call:expr) => {
+        match $self {
+            #[cfg(feature = "cpu")]
+            World::Cpu($world) => $call,
+            #[cfg(feature = "gpu")]
+            World::Gpu($world) => $call,
+        }
+    };
+}
+
+impl World {
+    /// Loads a scene. Bad values in it are named here at the latest.
+    pub fn new(scene: Scene, params: Params, backend: Backend) -> Result<Self> {
+        match backend {
+            Backend::Cpu => Self::cpu(scene, params),
+            Backend::Gpu => Self::gpu(scene, params),
+            Backend::Auto => Self::auto(scene, params),
+        }
+    }
+
+    #[cfg(feature = "cpu")]
+    fn cpu(scene: Scene, params: Params) -> Result<Self> {
+        Ok(Self::Cpu(Box::new(tumble_cpu::World::new(scene, params)?)))
+    }
+
+    #[cfg(not(feature = "cpu"))]
+    fn cpu(_: Scene, _: Params) -> Result<Self> {
+        Err(Error::NotBuilt { backend: "cpu" })
+    }
+
+    #[cfg(feature = "gpu")]
+    fn gpu(scene: Scene, params: Params) -> Result<Self> {
+        Ok(Self::Gpu(Box::new(tumble_gpu::World::new(scene, params)?)))
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn gpu(_: Scene, _: Params) -> Result<Self> {
+        Err(Error::NotBuilt { backend: "gpu" })
+    }
+
+    #[cfg(all(feature = "cpu", feature = "gpu"))]
+    fn auto(scene: Scene, params: Params) -> Result<Self> {
+        match tumble_gpu::Gpu::hardware() {
+            Ok(Some(gpu)) => Ok(Self::Gpu(Box::new(tumble_gpu::World::with_gpu(gpu, scene, params)?))),
+            Ok(None) | Err(_) => Self::cpu(scene, params),
+        }
+    }
+
+    #[cfg(not(all(feature = "cpu", feature = "gpu")))]
+    fn auto(scene: Scene, params: Params) -> Result<Self> {
+        if cfg!(feature = "cpu") { Self::cpu(scene, params) } else { Self::gpu(scene, params) }
+    }
+
+    /// Runs one step. On a GPU this submits, and waits only when three steps are in flight.
+    pub fn step(&mut self) -> Result<()> {
+        either!(self, world => world.step())
+    }
+
+    /// Waits for all submitted steps; the last one's report.
+    pub fn sync(&mut self) -> Result<StepReport> {
+        either!(self, world => world.sync())
+    }
+
+    /// Waits for all submitted steps; the pose of every body, in one download.
+    pub fn poses(&mut self) -> Result<Poses> {
+        either!(self, world => world.poses())
+    }
+
+    /// The newest poses that are there without waiting; `None` before the first have come.
+    pub fn try_poses(&mut self) -> Result<Option<Poses>> {
+        either!(self, world => world.try_poses())
+    }
+
+    /// Waits for all submitted steps; the velocity of every body, in one download.
+    pub fn velocities(&mut self) -> Result<Velocities> {
+        either!(self, world => world.velocities())
+    }
+
+    /// Edits for the next step: insert, remove, set, push. None of them waits or rebuilds the world.
+    pub fn edit(&mut self) -> &mut Editor {
+        either!(self, world => world.edit())
+    }
+
+    /// The scene as edited so far; poses in it are those at insertion.
+    pub fn scene(&self) -> &Scene {
+        either!(self, world => world.scene())
+    }
+
+    /// Parameters in force.
+    pub fn params(&self) -> &Params {
+        either!(self, world => world.params())
+    }
+
+    /// Parameters from the next step on.
+    pub fn set_params(&mut self, params: Params) -> Result<()> {
+        either!(self, world => world.set_params(params))
+    }
+}

@@ -1,0 +1,201 @@
+//! One step on the CPU, pass by pass, so that a test can take what any pass reads and what it should write.
+
+use std::iter;
+
+use bytemuck::Zeroable;
+use tumble_core::glam::Vec3;
+use tumble_core::layout::*;
+use tumble_core::{PackedScene, Params, Scene, limits, scenes};
+use tumble_cpu::batch::{self, Batches, Ends};
+use tumble_cpu::broadphase::grid;
+use tumble_cpu::contact::{self, Matched, NO_FEATURE};
+use tumble_cpu::solver::prepare::{Contact, prepare_body, prepare_constraint};
+use tumble_cpu::solver::{Bodies, PlainRows, solve_plain, store};
+use tumble_cpu::{bounds, motion, narrowphase};
+
+/// What lives from step to step.
+pub(crate) struct Cpu {
+    pub(crate) params: Params,
+    pub(crate) number: u32,
+    pub(crate) gravity: Vec3,
+    pub(crate) states: Vec<BodyState>,
+    pub(crate) props: Vec<BodyProps>,
+    pub(crate) colliders: Vec<Collider>,
+    pub(crate) pairs: Vec<Pair>,
+    free: Vec<u32>,
+    /// By slot.
+    pub(crate) batch_of_slot: Vec<u32>,
+    /// Four a slot.
+    pub(crate) impulses: Vec<Impulse>,
+    found: Vec<FoundManifold>,
+}
+
+/// What one step makes before anything is solved.
+pub(crate) struct Frame {
+    pub(crate) step: StepParams,
+    pub(crate) states: Vec<BodyState>,
+    pub(crate) aabbs: Vec<Aabb>,
+    pub(crate) matched: Matched,
+    pub(crate) manifolds: Vec<Manifold>,
+    pub(crate) ends: Vec<Ends>,
+    pub(crate) batches: Batches,
+}
+
+/// A scene of so many bodies in all, some of them fixed.
+pub(crate) fn scene_of(bodies: usize) -> Scene {
+    let fixed = scenes::mixed(0).len();
+    match bodies {
+        0 => Scene::new(),
+        1 => scenes::free_box().0,
+        2 => scenes::column(1),
+        _ => scenes::mixed(bodies - fixed),
+    }
+}
+
+impl Cpu {
+    /// The scene, and in it something of everything: forces, damping, bounces, kinematic and frozen bodies.
+    pub(crate) fn new(scene: &Scene) -> Self {
+        let packed = PackedScene::new(scene).unwrap();
+        let mut cpu = Self {
+            params: Params::default(),
+            number: 0,
+            gravity: packed.gravity,
+            states: packed.states,
+            props: packed.props,
+            colliders: packed.colliders,
+            pairs: Vec::new(),
+            free: Vec::new(),
+            batch_of_slot: Vec::new(),
+            impulses: Vec::new(),
+            found: Vec::new(),
+        };
+        let room = limits::initial_pairs(&cpu.params.capacities, cpu.colliders.len() as u32);
+        cpu.free = (0..room).rev().collect();
+        cpu.batch_of_slot = vec![UNBATCHED; room as usize];
+        cpu.found = vec![FoundManifold::zeroed(); room as usize];
+        cpu.impulses = vec![Impulse { normal: 0.0, tangent: [0.0; 2], feature: NO_FEATURE }; 4 * room as usize];
+        for (i, (state, props)) in cpu.states.iter_mut().zip(&mut cpu.props).enumerate() {
+            if state.flags != body_flags::DYNAMIC {
+                continue;
+            }
+            props.linear_damping = if i % 11 == 5 { 0.3 } else { 0.0 };
+            props.angular_damping = if i % 7 == 2 { 0.8 } else { 0.0 };
+            if i % 41 == 20 {
+                state.flags = body_flags::KINEMATIC;
+                state.linear_velocity = [0.1, 0.02, -0.1];
+                state.angular_velocity = [0.3, 1.0, 0.2];
+            } else if i % 53 == 30 {
+                state.flags |= body_flags::FROZEN;
+                state.linear_velocity = [0.0; 3];
+            }
+        }
+        for (i, collider) in cpu.colliders.iter_mut().enumerate() {
+            collider.restitution = [0.0, 0.6, 0.0, 0.3][i % 4];
+            collider.combine = (i as u32 / 2) % 16;
+        }
+        cpu
+    }
+
+    /// The scene after so many steps.
+    pub(crate) fn after(scene: &Scene, steps: u32) -> Self {
+        let mut cpu = Self::new(scene);
+        for _ in 0..steps {
+            let frame = cpu.plan(false);
+            cpu.commit(&frame);
+        }
+        cpu
+    }
+
+    /// The next step's plan phase.
+    pub(crate) fn plan(&self, recolor: bool) -> Frame {
+        let mut step = self.params.step_params(self.number + 1, self.gravity);
+        step.body_count = self.states.len() as u32;
+        step.collider_count = self.colliders.len() as u32;
+        step.cell_table_bits = limits::cell_table_bits(step.collider_count);
+        step.large_limit = limits::large_limit(step.collider_count);
+        step.pair_capacity = self.batch_of_slot.len() as u32;
+        step.wide_batches = 8;
+        let mut states = self.states.clone();
+        for (i, state) in states.iter_mut().enumerate().filter(|(i, s)| i % 9 == 7 && bounds::moves(s.flags)) {
+            state.force = [3.0 * (i % 5) as f32, -1.5, 200.0];
+            state.torque = [10.0, 0.5 * (i % 3) as f32, -20.0];
+        }
+        let body = |collider: u32| self.colliders[collider as usize].body;
+        let aabbs: Vec<_> = self
+            .colliders
+            .iter()
+            .map(|c| bounds::collider_bounds(c, &states[c.body as usize], &self.props[c.body as usize], &step))
+            .collect();
+        let grid = grid::choose(&aabbs, &step);
+        let found = grid::find_pairs(&grid, &grid::fill(&grid, &aabbs, &step), &aabbs);
+        let matched = contact::match_pairs(&self.pairs, &found.pairs, &self.colliders, &self.free, step.step);
+        let collide =
+            |pair: &Pair| narrowphase::collide(pair, &self.colliders, &states, &self.found[pair.slot as usize], &step);
+        let manifolds: Vec<_> = matched.pairs.iter().map(collide).collect();
+        let ends: Vec<_> = matched.pairs.iter().map(|pair| batch::ends(pair, &body, &states)).collect();
+        let kept = &self.batch_of_slot;
+        let batches = batch::place(&matched.pairs, &manifolds, &ends, kept, recolor, states.len(), &step);
+        Frame { step, states, aabbs, matched, manifolds, ends, batches }
+    }
+
+    pub(crate) fn bodies(&self, frame: &Frame) -> Vec<SolverBody> {
+        let bodies = frame.states.iter().zip(&self.props).zip(&frame.batches.masks);
+        bodies.map(|((state, props), mask)| prepare_body(state, props, *mask)).collect()
+    }
+
+    pub(crate) fn rows(&self, frame: &Frame, bodies: &[SolverBody]) -> PlainRows {
+        PlainRows::build(0..frame.batches.order.len(), |c| {
+            let index = frame.batches.order[c] as usize;
+            let pair = &frame.matched.pairs[index];
+            let stored = &self.impulses[4 * pair.slot as usize..][..4];
+            let contact = Contact { pair, manifold: &frame.manifolds[index], stored };
+            prepare_constraint(&contact, &self.colliders, bodies, &frame.step)
+        })
+    }
+
+    /// Impulses by slot as they are after `rows` were solved; slots without a constraint stay as they are.
+    pub(crate) fn stored(&self, frame: &Frame, rows: &PlainRows) -> Vec<Impulse> {
+        let mut impulses = self.impulses.clone();
+        for (c, &index) in frame.batches.order.iter().enumerate() {
+            let slot = frame.matched.pairs[index as usize].slot as usize;
+            for point in 0..4 {
+                let impulse = &rows.impulses[4 * c + point];
+                impulses[4 * slot + point] =
+                    store::store(&frame.manifolds[index as usize], point, impulse.normal, impulse.tangent);
+            }
+        }
+        impulses
+    }
+
+    /// Solves the step and keeps its result.
+    pub(crate) fn commit(&mut self, frame: &Frame) {
+        let mut bodies = self.bodies(frame);
+        let mut rows = self.rows(frame, &bodies);
+        let moving = Bodies { solver: &mut bodies, states: &frame.states, props: &self.props };
+        solve_plain(&mut rows, moving, &frame.step, true);
+        contact::commit_free(&mut self.free, &frame.matched);
+        for ((pair, manifold), batch) in frame.matched.pairs.iter().zip(&frame.manifolds).zip(&frame.batches.of_pair) {
+            let slot = pair.slot as usize;
+            if manifold.recycled == 0 {
+                let rotation = |c: u32| frame.states[self.colliders[c as usize].body as usize].rotation;
+                let (rotation_a, rotation_b) = (rotation(pair.a), rotation(pair.b));
+                self.found[slot] = FoundManifold { rotation_a, rotation_b, manifold: *manifold };
+            }
+            let impulses = &mut self.impulses[4 * slot..][..4];
+            contact::commit_pair(manifold, *batch, &mut self.batch_of_slot[slot], impulses);
+        }
+        self.impulses = self.stored(frame, &rows);
+        self.states = iter::zip(&bodies, &frame.states).map(|(b, s)| motion::commit(b, s).0).collect();
+        self.pairs = frame.matched.pairs.clone();
+        self.number += 1;
+    }
+}
+
+/// A control block with what the passes after the narrow phase read.
+pub(crate) fn control_of(frame: &Frame, recolor: bool) -> Control {
+    let mut control = Control { recolor: recolor.into(), ..Control::zeroed() };
+    control.pair_count = frame.matched.pairs.len() as u32;
+    control.new_count = frame.matched.new_count;
+    control.dead_count = frame.matched.dead_slots.len() as u32;
+    control
+}
