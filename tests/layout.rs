@@ -240,7 +240,7 @@ fn tables_are_complete() {
                     assert!(layouts.contains_key(name), "{path:?}: struct {name} is in no table");
                     found += 1;
                 }
-                ["pub", "const", name, ..] => {
+                ["pub", "const", name, ..] if *name != "fn" => {
                     let name = format!("{module}{name}");
                     assert!(constants.contains(name.as_str()), "{path:?}: constant {name} is in no table");
                     found += 1;

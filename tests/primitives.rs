@@ -1,5 +1,5 @@
-//! Scan, sort and dispatch arguments on the GPU: exactly what the CPU mirror, and Rust's own stable sort, give, in every
-//! order of invocations. Oracles: the mirror, the standard library.
+//! Scan, sort and dispatch arguments on the GPU: exactly what the CPU mirror, and Rust's own stable sort, give, in
+//! every order of invocations. Oracles: the mirror, the standard library.
 
 mod common;
 

@@ -93,7 +93,8 @@ fn half_of(word: u32, digit: u32) -> u32 {
 
 // Place in the sorted block of the first element of this digit that an invocation has, from the scanned counters.
 fn place(digit: u32, local: u32, lower_total: u32) -> u32 {
-    return half_of(counters[(digit % COUNTERS) * WORKGROUP + local], digit) + select(0u, lower_total, digit >= COUNTERS);
+    let before = half_of(counters[(digit % COUNTERS) * WORKGROUP + local], digit);
+    return before + select(0u, lower_total, digit >= COUNTERS);
 }
 
 @compute @workgroup_size(256)

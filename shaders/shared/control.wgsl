@@ -1,6 +1,7 @@
 // Counters and decisions of a step. Fields: crates/core/src/layout/control.rs.
 //
-// Most passes read it as a uniform, so its arrays are of vec4: element i of `batch_start` is `batch_start[i / 4][i % 4]`.
+// Most passes read it as a uniform, so its arrays are of vec4: element i of `batch_start` is
+// `batch_start[i / 4][i % 4]`.
 // Passes that count bind the same buffer as `array<atomic<u32>>` and find a field by its word, CONTROL_<FIELD>; of a
 // vector or an array that is the first word.
 

@@ -8,8 +8,8 @@
 //   ..._tail   one workgroup: the batches from `step.wide_batches` on, one after the other, one thread each 256th
 //              constraint; the last batch, whose constraints do share bodies, in order: each thread in turn visits 128
 //
-// Harada, "Parallelizing the Physics Pipeline" (GDC 2009). Loops take at most 9 turns for each 256 constraints of the
-// tail, and 11 for each 8 of the last batch.
+// Harada, "Parallelizing the Physics Pipeline" (GDC 2009). Loops: 9 turns for each 256 constraints of the tail; in the
+// last batch 9 for each of the 128, and one a thread.
 
 //#import shared/control.wgsl
 //#import shared/thread.wgsl
@@ -37,73 +37,51 @@ fn start_of(index: u32) -> u32 {
     return control.batch_start[index / 4u][index % 4u];
 }
 
-
-fn one(kind: u32, head: ConstraintHead, t: mat2x3<f32>, point: ptr<function, ConstraintPoint>, impulse: ptr<function, Impulse>, a: ptr<function, SolverBody>, b: ptr<function, SolverBody>) {
-        if kind == WARM_START {
-            warm_start_point(head.normal, t, point, impulse, a, b);
-        } else if kind == RESTITUTION {
-            bounce(head.restitution, head.normal, point, impulse, a, b, step);
-        } else {
-            push_normal(kind, head, point, impulse, a, b, step);
-        }
-}
-fn write(kind: u32, p: u32, point: ptr<function, ConstraintPoint>, impulse: ptr<function, Impulse>) {
-        if kind == WARM_START {
-        } else if kind == RESTITUTION {
-            impulses[p].normal = (*impulse).normal;
-        } else {
-            impulses[p] = *impulse;
-            points[p].max_impulse = (*point).max_impulse;
-            if kind == RELAX {
-                points[p].approach = (*point).approach;
-            }
-        }
-}
+// One visit to constraint c: normals first, then friction within the cone that they allow. Only the velocities of
+// bodies that move are written. (A constraint has a point at least; a loop that tests at its end saves llvmpipe one
+// turn with no lane active.)
 fn visit(kind: u32, c: u32) {
     let head = heads[c];
     var a = solver_bodies[head.body_a];
     var b = solver_bodies[head.body_b];
     let t = tangents(head.normal);
     let first = 4u * c;
-    var p0: ConstraintPoint;
-    var i0: Impulse;
-    if head.count > 0u {
-        p0 = points[first + 0u];
-        i0 = impulses[first + 0u];
-        one(kind, head, t, &p0, &i0, &a, &b);
-    }
-    var p1: ConstraintPoint;
-    var i1: Impulse;
-    if head.count > 1u {
-        p1 = points[first + 1u];
-        i1 = impulses[first + 1u];
-        one(kind, head, t, &p1, &i1, &a, &b);
-    }
-    var p2: ConstraintPoint;
-    var i2: Impulse;
-    if head.count > 2u {
-        p2 = points[first + 2u];
-        i2 = impulses[first + 2u];
-        one(kind, head, t, &p2, &i2, &a, &b);
-    }
-    var p3: ConstraintPoint;
-    var i3: Impulse;
-    if head.count > 3u {
-        p3 = points[first + 3u];
-        i3 = impulses[first + 3u];
-        one(kind, head, t, &p3, &i3, &a, &b);
+    let end = first + min(head.count, 4u);
+    var p = first;
+    loop {
+        var point = points[p];
+        var impulse = impulses[p];
+        if kind == WARM_START {
+            warm_start_point(head.normal, t, &point, &impulse, &a, &b);
+        } else if kind == RESTITUTION {
+            bounce(head.restitution, head.normal, &point, &impulse, &a, &b, step);
+            impulses[p].normal = impulse.normal;
+        } else {
+            push_normal(kind, head, &point, &impulse, &a, &b, step);
+            impulses[p].normal = impulse.normal;
+            points[p].max_impulse = point.max_impulse;
+            if kind == RELAX {
+                points[p].approach = point.approach;
+            }
+        }
+        continuing {
+            p++;
+            break if p >= end;
+        }
     }
     if kind == SOLVE || kind == RELAX {
-        if head.count > 0u { push_tangent(head.friction, t, &p0, &i0, &a, &b); }
-        if head.count > 1u { push_tangent(head.friction, t, &p1, &i1, &a, &b); }
-        if head.count > 2u { push_tangent(head.friction, t, &p2, &i2, &a, &b); }
-        if head.count > 3u { push_tangent(head.friction, t, &p3, &i3, &a, &b); }
+        p = first;
+        loop {
+            var point = points[p];
+            var impulse = impulses[p];
+            push_tangent(head.friction, t, &point, &impulse, &a, &b);
+            impulses[p].tangent = impulse.tangent;
+            continuing {
+                p++;
+                break if p >= end;
+            }
+        }
     }
-    if head.count > 0u { write(kind, first + 0u, &p0, &i0); }
-    if head.count > 1u { write(kind, first + 1u, &p1, &i1); }
-    if head.count > 2u { write(kind, first + 2u, &p2, &i2); }
-    if head.count > 3u { write(kind, first + 3u, &p3, &i3); }
-
     if a.inverse_mass > 0.0 {
         solver_bodies[head.body_a].linear_velocity = a.linear_velocity;
         solver_bodies[head.body_a].angular_velocity = a.angular_velocity;

@@ -98,9 +98,6 @@ impl<T> Slots<T> {
     pub(crate) fn live(&self) -> usize {
         self.entries.len() - self.free.len()
     }
-    pub(crate) fn at(&self, slot: usize) -> Option<(u32, &T)> {
-        self.entries.get(slot).and_then(|e| e.1.as_ref().map(|v| (e.0, v)))
-    }
     pub(crate) fn iter(&self) -> impl Iterator<Item = (u32, u32, &T)> {
         self.entries.iter().enumerate().filter_map(|(i, e)| e.1.as_ref().map(|v| (i as u32, e.0, v)))
     }
