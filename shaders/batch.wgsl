@@ -7,28 +7,29 @@
 // winner takes the lowest batch that neither body is in. Constraints keep their batch while they touch; fixed,
 // kinematic and frozen bodies never conflict. What the rounds leave goes to the last batch, solved in sequence.
 //
-//   begin      one thread a pair: keeps its batch, or puts it on the list `unplaced`
-//   bid        one thread an entry of the list: claims its bodies; one that finds no batch free joins the last one
-//   place      the same: who holds both bodies takes the lowest free batch. The host runs 8 rounds of these two
-//   compact    the same: who still waits goes to a shorter list (in `batch_order`, which is not yet in use)
-//   tail       one workgroup: more rounds over that list, one thread each 256th entry
-//   finish     one thread a pair: who still waits joins the last batch; keys and values for the sort
-//   degree     one thread a body: counts the batches that it is in
-//   (primitives/sort of `batch_keys` with `batch_order`)
-//   table      one thread a batch: its first constraint
-//   gate       one workgroup: what the step reports, whether it may go on, and the solver's dispatches
+//   begin      one thread a pair: keeps its batch, or puts the pair on the list `unplaced`. Reads next_pairs,
+//              manifolds, batch_of_slot; writes pair_batch, masks
+//   bid        one thread an entry of the list: claims its bodies; one that finds no batch free joins the last one.
+//              Reads next_pairs; writes claims, pair_batch, masks
+//   place      the same: who holds both bodies takes the lowest free batch. The host runs 8 rounds of these two.
+//              Reads next_pairs, claims; writes pair_batch, masks
+//   compact    the same: who still waits goes on a shorter list (in `batch_order`, which is not yet in use)
+//   tail       one workgroup, one thread each 256th entry of that list: bids and places in more rounds
+//   finish     one thread a pair: who still waits joins the last batch; batch_keys and batch_order, to be sorted
+//   degree     one thread a body: how many batches it is in, from masks
+//   (primitives/sort of batch_keys with batch_order)
+//   table      one thread a batch: its first constraint, from batch_keys
+//   gate       one workgroup: what the step reports, whether it may go on, and dispatch_args for the solver
 //
-// Which body a collider is on, and whether it moves, its box says (`aabbs`).
+// All count in `counters`. What the rounds do to the graph is in shared/graph.wgsl.
 
-//#import shared/collider.wgsl
 //#import shared/control.wgsl
+//#import shared/graph.wgsl
 //#import shared/manifold.wgsl
-//#import shared/pair.wgsl
 //#import shared/step.wgsl
 //#import shared/thread.wgsl
 
 const PENDING: u32 = 254u; // in place of a batch: wants one
-const NO_BODY: u32 = 0xffffffffu; // in place of a body that never conflicts
 const WIDE_ROUNDS: u32 = 8u; // rounds over all entries at once; crates/core/src/limits.rs
 const BATCH_ROUNDS: u32 = 62u; // and most rounds in all
 const COUNTER_RECOLOR_NEXT: u32 = 31u; // scratch words of the counters
@@ -50,22 +51,11 @@ struct Round {
     pad_c: u32,
 }
 
-// The moving bodies of a pair.
-struct Ends {
-    a: u32,
-    b: u32,
-}
-
-@group(0) @binding(0) var<uniform> step: StepParams;
-@group(0) @binding(1) var<uniform> round: Round;
-@group(0) @binding(2) var<storage, read_write> counters: array<atomic<u32>>;
-@group(0) @binding(3) var<storage, read> next_pairs: array<Pair>;
-@group(0) @binding(4) var<storage, read> manifolds: array<Manifold>;
-@group(0) @binding(5) var<storage, read> aabbs: array<Aabb>;
-@group(0) @binding(6) var<storage, read> batch_of_slot: array<u32>;
-@group(0) @binding(7) var<storage, read_write> pair_batch: array<u32>;
-@group(0) @binding(8) var<storage, read_write> masks: array<atomic<u32>>;
-@group(0) @binding(9) var<storage, read_write> claims: array<atomic<u32>>;
+@group(0) @binding(5) var<uniform> step: StepParams;
+@group(0) @binding(6) var<uniform> round: Round;
+@group(0) @binding(7) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(8) var<storage, read> manifolds: array<Manifold>;
+@group(0) @binding(9) var<storage, read> batch_of_slot: array<u32>;
 @group(0) @binding(10) var<storage, read_write> unplaced: array<u32>;
 @group(0) @binding(11) var<storage, read_write> batch_keys: array<u32>;
 @group(0) @binding(12) var<storage, read_write> batch_order: array<u32>;
@@ -77,94 +67,6 @@ var<workgroup> entries_left: u32;
 var<workgroup> still_pending: atomic<u32>;
 var<workgroup> any_pending: u32;
 var<workgroup> highest_degree: atomic<u32>;
-
-// A bijection of 26 bits: equal inputs alone collide.
-fn hash26(x: u32) -> u32 {
-    let mask = (1u << 26u) - 1u;
-    var h = (x * 0x9e3779b1u) & mask;
-    h = h ^ (h >> 13u);
-    h = (h * 0x85ebca6bu) & mask;
-    return h ^ (h >> 13u);
-}
-
-// Claim of a constraint in a round: later rounds undercut earlier ones, so that claims need no clearing.
-fn claim(pair: u32, round_index: u32) -> u32 {
-    return ((63u - round_index) << 26u) | hash26(pair);
-}
-
-fn end_of(collider: u32) -> u32 {
-    let body = aabbs[collider].body;
-    return select(NO_BODY, body & AABB_INDEX, (body & AABB_DYNAMIC) != 0u);
-}
-
-fn ends(pair: u32) -> Ends {
-    return Ends(end_of(next_pairs[pair].a), end_of(next_pairs[pair].b));
-}
-
-fn join_one(body: u32, batch: u32) {
-    if body != NO_BODY {
-        atomicOr(&masks[2u * body + batch / 32u], 1u << (batch % 32u));
-    }
-}
-
-fn join(at: Ends, batch: u32) {
-    join_one(at.a, batch);
-    join_one(at.b, batch);
-}
-
-fn taken(at: Ends, word: u32) -> u32 {
-    var bits = 0u;
-    if at.a != NO_BODY {
-        bits |= atomicLoad(&masks[2u * at.a + word]);
-    }
-    if at.b != NO_BODY {
-        bits |= atomicLoad(&masks[2u * at.b + word]);
-    }
-    return bits;
-}
-
-fn lowest_free(at: Ends) -> u32 {
-    let low = taken(at, 0u);
-    if low != 0xffffffffu {
-        return countTrailingZeros(~low);
-    }
-    return 32u + countTrailingZeros(~taken(at, 1u));
-}
-
-fn holds(at: Ends, bidden: u32) -> bool {
-    if at.a != NO_BODY && atomicLoad(&claims[at.a]) != bidden {
-        return false;
-    }
-    return at.b == NO_BODY || atomicLoad(&claims[at.b]) == bidden;
-}
-
-// Masks only fill: one that finds none free never will, and must not stand in its neighbours' way.
-fn bid_for(pair: u32, round_index: u32) {
-    let at = ends(pair);
-    if lowest_free(at) >= LAST_BATCH {
-        pair_batch[pair] = LAST_BATCH;
-        join(at, LAST_BATCH);
-        return;
-    }
-    if at.a != NO_BODY {
-        atomicMin(&claims[at.a], claim(pair, round_index));
-    }
-    if at.b != NO_BODY {
-        atomicMin(&claims[at.b], claim(pair, round_index));
-    }
-}
-
-// Winners of one round share no moving body, so that each alone reads and fills the masks of its own.
-fn place_if_held(pair: u32, round_index: u32) -> bool {
-    let at = ends(pair);
-    if !holds(at, claim(pair, round_index)) {
-        return false;
-    }
-    let batch = lowest_free(at);
-    pair_batch[pair] = batch;
-    join(at, batch);
-    return true;
-}
 
 // Where on a list whose length is in `counters[word]` this invocation's element goes, if it `wants` one. The order is
 // the atomics', and nothing depends on it. To be called by all invocations of a workgroup, once in a dispatch.

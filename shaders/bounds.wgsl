@@ -135,11 +135,13 @@ fn bounds_of(collider: Collider) -> Aabb {
         let own = props[collider.body];
         acceleration = step.gravity * own.gravity_scale + state.force * own.inverse_mass;
     }
+    // Where it ends lies between the two.
+    let straight = state.linear_velocity * step.dt;
     let sweep = (state.linear_velocity + acceleration * step.dt) * step.dt;
     let arc = min(length(state.angular_velocity) * step.dt, 2.0) * reach;
     let margin = extent + vec3<f32>(arc + 0.5 * step.speculative_distance);
-    let lowest = min(middle - margin, middle - margin + sweep);
-    let highest = max(middle + margin, middle + margin + sweep);
+    let lowest = min(min(middle - margin, middle - margin + straight), middle - margin + sweep);
+    let highest = max(max(middle + margin, middle + margin + straight), middle + margin + sweep);
     return Aabb(lowest, body, highest, size_class(max_element(highest - lowest)));
 }
 

@@ -11,7 +11,7 @@ const TURN: f32 = 0.01;
 // The manifold found earlier with this step's gaps; without points if the two have moved against each other since.
 fn recycle(couple: Couple, found: FoundManifold) -> Manifold {
     var manifold = found.manifold;
-    if manifold.count == 0u {
+    if manifold.count < 4u {
         return Manifold();
     }
     // Turns since then, in the world's axes.

@@ -57,10 +57,14 @@ fn visit(kind: u32, c: u32) {
             bounce(head.restitution, head.normal, &point, &impulse, &a, &b, step);
             impulses[p].normal = impulse.normal;
         } else {
+            // Both seldom change, and a write that is not made costs nothing.
+            let highest = point.max_impulse;
             push_normal(kind, head, &point, &impulse, &a, &b, step);
             impulses[p].normal = impulse.normal;
-            points[p].max_impulse = point.max_impulse;
-            if kind == RELAX {
+            if point.max_impulse > highest {
+                points[p].max_impulse = point.max_impulse;
+            }
+            if kind == RELAX && highest == 0.0 {
                 points[p].approach = point.approach;
             }
         }

@@ -1,4 +1,5 @@
 //! One step on the CPU, pass by pass, so that a test can take what any pass reads and what it should write.
+#![allow(dead_code, reason = "each test program uses a part")]
 
 use std::iter;
 
@@ -27,7 +28,7 @@ pub(crate) struct Cpu {
     pub(crate) batch_of_slot: Vec<u32>,
     /// Four a slot.
     pub(crate) impulses: Vec<Impulse>,
-    found: Vec<FoundManifold>,
+    pub(crate) found: Vec<FoundManifold>,
 }
 
 /// What one step makes before anything is solved.

@@ -110,6 +110,10 @@ impl Crowd {
             if halfspace {
                 state.rotation = Quat::IDENTITY.to_array();
             }
+            if i % 20 == 6 {
+                // Turns by more than two radians in a step.
+                state.angular_velocity = random.vector(300.0).to_array();
+            }
             let shape = match random.below(20) {
                 _ if halfspace => shape_kind::HALFSPACE,
                 0 => shape_kind::NONE,

@@ -79,11 +79,13 @@ pub fn collider_bounds(collider: &Collider, state: &BodyState, props: &BodyProps
     } else {
         Vec3::ZERO
     };
+    // Where it ends lies between the two.
+    let straight = vec3(state.linear_velocity) * step.dt;
     let sweep = (vec3(state.linear_velocity) + acceleration * step.dt) * step.dt;
     let arc = (vec3(state.angular_velocity).length() * step.dt).min(2.0) * reach;
     let margin = extent + Vec3::splat(arc + 0.5 * step.speculative_distance);
-    let min = (center - margin).min(center - margin + sweep);
-    let max = (center + margin).max(center + margin + sweep);
+    let min = (center - margin).min(center - margin + straight).min(center - margin + sweep);
+    let max = (center + margin).max(center + margin + straight).max(center + margin + sweep);
     Aabb { min: min.to_array(), body, max: max.to_array(), class: size_class((max - min).max_element()) }
 }
 

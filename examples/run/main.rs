@@ -1,0 +1,131 @@
+//! Runs a standard scene, and tells what a step costs and how good its result is:
+//! `cargo run --release --example run -- pile --bodies 1000`.
+//!
+//! Every step is waited for. All steps count, the first ones too: there is no warm-up.
+
+mod args;
+mod outcome;
+
+use args::{Args, Failure};
+use indicatif::{ProgressBar, ProgressStyle};
+use outcome::Outcome;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write};
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+use tumble::core::{measures, scenes};
+use tumble::{Backend, World};
+
+fn main() -> ExitCode {
+    let failure = match args::parse().and_then(|args| if args.list { list() } else { run(&args) }) {
+        Ok(()) => return ExitCode::SUCCESS,
+        Err(failure) => failure,
+    };
+    let (code, message) = match failure {
+        Failure::Argument(message) => (2, message),
+        Failure::Run(message) => (1, message),
+    };
+    tell(&format!("error: {message}"));
+    ExitCode::from(code)
+}
+
+/// A line on standard error. Unlike `eprintln!`, it does not panic when nobody can read it.
+fn tell(line: &str) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// Text on standard output. A reader that had enough, as in `run --list | head -1`, is no error.
+fn print(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Failure::Run(format!("cannot write to standard output: {error}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn list() -> Result<(), Failure> {
+    let line = |s: &scenes::StandardScene| format!("{:<8} {:>5} bodies   {}\n", s.name, s.default_bodies, s.about);
+    print(&scenes::ALL.iter().map(line).collect::<String>())
+}
+
+fn run(args: &Args) -> Result<(), Failure> {
+    let params = args.params()?;
+    let (standard, bodies) = args.scene()?;
+    // Before the run, so that a bad path costs no time.
+    let mut json = args.json.as_deref().map(open).transpose()?;
+    let mut world = World::new((standard.build)(bodies), params, args.backend())?;
+    #[cfg(feature = "cpu")]
+    if matches!((args.backend(), &world), (Backend::Auto, World::Cpu(_))) {
+        tell("no GPU can be used (software adapters do not count here): running on the CPU");
+    }
+    let mut outcome = Outcome::new(standard.name, args.steps, &params, world.scene());
+    take_steps(&mut world, &mut outcome)?;
+
+    let spinner = ProgressBar::new_spinner().with_message("measuring the overlap");
+    spinner.enable_steady_tick(Duration::from_millis(100));
+    let (poses, velocities) = (world.poses()?, world.velocities()?);
+    outcome.penetration = measures::penetration(world.scene(), &poses);
+    outcome.kinetic_energy = measures::kinetic_energy(world.scene(), &poses, &velocities);
+    outcome.state_hash = measures::state_hash(&poses, &velocities);
+    spinner.finish_and_clear();
+
+    // The table last and in any case: a full disk does not take the result of a long run away.
+    let written = json.as_mut().map_or(Ok(()), |(file, path)| write(file, path, &outcome));
+    print(&outcome.table())?;
+    written
+}
+
+/// Runs the steps and notes what each took.
+fn take_steps(world: &mut World, outcome: &mut Outcome) -> Result<(), Failure> {
+    let bar = progress_bar(outcome.steps)?;
+    for number in 1..=outcome.steps {
+        let begin = Instant::now();
+        let report = world.step().and_then(|()| world.sync());
+        let milliseconds = begin.elapsed().as_secs_f64() * 1e3;
+        match report {
+            Ok(report) => outcome.add(milliseconds, report),
+            Err(error) => {
+                bar.finish_and_clear();
+                return Err(Failure::Run(format!("step {number}: {error}")));
+            }
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(())
+}
+
+/// On standard error, and only if that is a terminal.
+fn progress_bar(steps: u32) -> Result<ProgressBar, Failure> {
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} steps, {eta} left")
+        .map_err(|error| Failure::Run(error.to_string()))?;
+    Ok(ProgressBar::new(steps.into()).with_style(style))
+}
+
+/// Opens a file to be written at the end; until then it keeps what is in it.
+fn open(path: &Path) -> Result<(File, &Path), Failure> {
+    match OpenOptions::new().write(true).create(true).truncate(false).open(path) {
+        Ok(file) => Ok((file, path)),
+        Err(error) => Err(cannot_write(path, &error)),
+    }
+}
+
+fn write(file: &mut File, path: &Path, outcome: &Outcome) -> Result<(), Failure> {
+    let text = format!("{:#}\n", outcome.json());
+    let mut replace = || {
+        // What is no regular file, such as a pipe, has no length to cut.
+        if file.metadata()?.is_file() {
+            file.set_len(0)?;
+        }
+        file.write_all(text.as_bytes())?;
+        file.flush()
+    };
+    replace().map_err(|error| cannot_write(path, &error))
+}
+
+fn cannot_write(path: &Path, error: &io::Error) -> Failure {
+    Failure::Run(format!("cannot write {}: {error}", path.display()))
+}

@@ -1,0 +1,293 @@
+//! The program `examples/run`: what it prints and writes, how it refuses, and what README.md says of it. Oracles: its
+//! documented fields, and the library run on the same scene.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+use tumble::core::{measures, scenes};
+use tumble::{Backend, Params, World};
+
+const FIELDS: [&str; 19] = [
+    "scene",
+    "backend",
+    "adapter",
+    "bodies",
+    "steps",
+    "dt",
+    "substeps",
+    "ms_per_step",
+    "passes",
+    "pairs",
+    "contacts",
+    "batches",
+    "penetration",
+    "kinetic_energy_j",
+    "memory_bytes",
+    "growths",
+    "lost",
+    "quarantined",
+    "state_hash",
+];
+
+/// The program. Plain `cargo test` has built it beside the tests; one test alone would find an old one there, so cargo
+/// looks again.
+fn program() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let test = std::env::current_exe().unwrap();
+        let profile = test.ancestors().nth(2).unwrap();
+        if let Some(cargo) = std::env::var_os("CARGO") {
+            let release = if cfg!(debug_assertions) { None } else { Some("--release") };
+            let build = Command::new(cargo)
+                .args(["build", "--quiet", "--example", "run"])
+                .args(release)
+                .env("CARGO_TARGET_DIR", profile.parent().unwrap())
+                .current_dir(env!("CARGO_MANIFEST_DIR"))
+                .status();
+            assert!(build.unwrap().success(), "the example builds");
+        }
+        let path = profile.join("examples").join(format!("run{}", std::env::consts::EXE_SUFFIX));
+        assert!(path.exists(), "{} is missing: cargo build --release --example run", path.display());
+        path
+    })
+}
+
+fn run(arguments: &[&str]) -> Output {
+    Command::new(program()).args(arguments).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
+/// What it says on standard error; drivers may say things there too.
+fn error_line(output: &Output) -> &str {
+    let told: Vec<_> = text(&output.stderr).lines().filter(|line| !line.contains("XDG_RUNTIME_DIR")).collect();
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].starts_with("error: ") && !told[0].contains("panicked"), "{told:?}");
+    told[0]
+}
+
+fn keys(value: &Value) -> Vec<&str> {
+    value.as_object().unwrap().keys().map(String::as_str).collect()
+}
+
+#[test]
+fn list_names_the_scenes() {
+    let output = run(&["--list"]);
+    assert!(output.status.success() && output.stderr.is_empty());
+    let told: Vec<_> = text(&output.stdout).lines().collect();
+    assert_eq!(told.len(), scenes::ALL.len());
+    for (line, scene) in told.iter().zip(scenes::ALL) {
+        assert!(line.starts_with(scene.name) && line.ends_with(scene.about), "{line}");
+    }
+}
+
+#[test]
+fn json_has_the_documented_fields() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("out.json");
+    // What was there is replaced, however long.
+    std::fs::write(&file, "x".repeat(1 << 16)).unwrap();
+    let path = file.to_str().unwrap();
+    let output = run(&[
+        "pile",
+        "--bodies",
+        "50",
+        "--steps",
+        "90",
+        "--dt",
+        "0.01",
+        "--substeps",
+        "3",
+        "--threads",
+        "2",
+        "--backend",
+        "cpu",
+        "--broadphase",
+        "grid",
+        "--profile",
+        "--json",
+        path,
+    ]);
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", text(&output.stderr));
+    let json: Value = serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
+    let mut expected = FIELDS;
+    expected.sort_unstable();
+    let mut found = keys(&json);
+    found.sort_unstable();
+    assert_eq!(found, expected);
+
+    let params = Params { dt: 0.01, substeps: 3, ..Params::default() };
+    let mut world = World::new(scenes::pile(50), params, Backend::Cpu).unwrap();
+    for _ in 0..90 {
+        world.step().unwrap();
+    }
+    let (report, poses, velocities) = (world.sync().unwrap(), world.poses().unwrap(), world.velocities().unwrap());
+    let overlap = measures::penetration(world.scene(), &poses);
+    let hash = format!("{:016x}", measures::state_hash(&poses, &velocities));
+    assert_eq!(json["state_hash"], hash);
+    assert_eq!(json["penetration"]["max_m"].as_f64().unwrap().to_bits(), overlap.max_m.to_bits());
+    assert_eq!(json["penetration"]["mean_m"].as_f64().unwrap().to_bits(), overlap.mean_m.to_bits());
+    let energy = measures::kinetic_energy(world.scene(), &poses, &velocities);
+    assert_eq!(json["kinetic_energy_j"].as_f64().unwrap().to_bits(), energy.to_bits());
+    let counts = [
+        ("bodies", 50),
+        ("steps", 90),
+        ("substeps", 3),
+        ("pairs", report.pairs.into()),
+        ("contacts", report.contacts.into()),
+        ("batches", report.batches.into()),
+        ("memory_bytes", report.memory_bytes),
+        ("lost", 0),
+        ("quarantined", 0),
+    ];
+    for (field, count) in counts {
+        assert_eq!(json[field], count, "{field}");
+    }
+    assert!(report.contacts > 0);
+    assert_eq!((&json["scene"], &json["backend"]), (&"pile".into(), &"cpu".into()));
+    assert!(json["adapter"].as_str().unwrap().contains("2 threads"));
+    assert_eq!(json["dt"].as_f64().unwrap() as f32, 0.01);
+    assert!(keys(&json["growths"]).is_empty());
+    let (median, p95) = (json["ms_per_step"]["median"].as_f64().unwrap(), json["ms_per_step"]["p95"].as_f64().unwrap());
+    assert!(median > 0.0 && p95 >= median);
+    assert!(keys(&json["passes"]).contains(&"solver"));
+    assert!(json["passes"].as_object().unwrap().values().all(|ms| ms.as_f64().is_some_and(|ms| ms >= 0.0)), "{json}");
+    // The table says the same.
+    let table = text(&output.stdout);
+    for told in ["pile", "cpu (", "50 dynamic", "90 of 0.01 s", "ms a step", "ms a pass", "  solver", &hash] {
+        assert!(table.contains(told), "{told}: {table}");
+    }
+}
+
+#[test]
+fn runs_on_an_adapter() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("out.json");
+    let output =
+        run(&["column", "--bodies", "5", "--steps", "3", "--backend", "gpu", "--json", file.to_str().unwrap()]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let json: Value = serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
+    assert_eq!((&json["backend"], &json["bodies"], &json["lost"]), (&"gpu".into(), &5.into(), &0.into()));
+    assert_eq!((&json["contacts"], &json["passes"]), (&20.into(), &Value::Null));
+    eprintln!("adapter: {}", json["adapter"]);
+}
+
+#[test]
+fn bad_arguments_are_refused_in_one_line() {
+    let cases: [(&[&str], &[&str]); 21] = [
+        (&[], &["no scene", "pile", "pyramid", "hub"]),
+        (&["pyramd"], &["'pyramd'", "pile", "balls", "mixed", "column", "hub", "similar", "'pyramid'"]),
+        (&["pile", "--bodies", "0"], &["'0'", "--bodies", "1 to 5000000"]),
+        (&["pile", "--bodies", "-5"], &["'-5'", "--bodies", "1 to 5000000"]),
+        (&["pile", "--bodies", "1e12"], &["'1e12'", "--bodies", "1 to 5000000"]),
+        (&["pile", "--bodies", "1000000000000"], &["--bodies", "1 to 5000000"]),
+        (&["pile", "--bodies", "5000001"], &["'5000001'", "--bodies", "1 to 5000000"]),
+        (&["pile", "--bodies"], &["--bodies"]),
+        (&["pile", "--steps", "0"], &["'0'", "--steps", "1 to 10000000"]),
+        (&["pile", "--dt", "-0.1"], &["dt is -0.1", "1e-6 to 1 s"]),
+        (&["pile", "--dt", "0"], &["dt is 0", "1e-6 to 1 s"]),
+        (&["pile", "--dt", "NaN"], &["dt is NaN", "1e-6 to 1 s"]),
+        (&["pile", "--dt", "-inf"], &["dt is -inf", "1e-6 to 1 s"]),
+        (&["pile", "--dt", "fast"], &["'fast'", "--dt"]),
+        (&["pile", "--substeps", "0"], &["'0'", "--substeps", "1 to 256"]),
+        (&["pile", "--substeps", "257"], &["'257'", "--substeps", "1 to 256"]),
+        (&["pile", "--threads", "0"], &["'0'", "--threads", "1 to 1024"]),
+        (&["pile", "--backend", "metal"], &["'metal'", "--backend", "auto", "cpu", "gpu"]),
+        (&["pile", "--broadphase", "sweep"], &["'sweep'", "--broadphase", "auto", "grid"]),
+        (&["pile", "hub"], &["'hub'"]),
+        (&["pile", "--fast"], &["'--fast'"]),
+    ];
+    for (arguments, told) in cases {
+        let output = run(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(output.stdout.is_empty());
+        let line = error_line(&output);
+        assert!(told.iter().all(|word| line.contains(word)), "{arguments:?}: {line}");
+    }
+}
+
+/// The limits that the program names are those of the library.
+#[test]
+fn limits_agree_with_the_library() {
+    for (substeps, threads) in [(1, 1), (256, 1024)] {
+        Params { substeps, threads: Some(threads), ..Params::default() }.validate().unwrap();
+    }
+    for (substeps, threads) in [(0, 1), (257, 1), (1, 0), (1, 1025)] {
+        Params { substeps, threads: Some(threads), ..Params::default() }.validate().unwrap_err();
+    }
+}
+
+#[test]
+fn a_path_that_cannot_be_written_costs_no_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let missing = folder.path().join("none").join("out.json");
+    for path in [missing.as_path(), folder.path()] {
+        let output = run(&["column", "--backend", "cpu", "--steps", "10000000", "--json", path.to_str().unwrap()]);
+        assert_eq!(output.status.code(), Some(1));
+        let line = error_line(&output);
+        assert!(line.contains("cannot write") && line.contains(path.to_str().unwrap()), "{line}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_told_and_the_table_still_comes() {
+    use std::fs::OpenOptions;
+    let run = ["column", "--backend", "cpu", "--steps", "2"];
+    let output = Command::new(program()).args(run).args(["--json", "/dev/full"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let line = error_line(&output);
+    assert!(line.contains("cannot write /dev/full") && line.contains("No space left"), "{line}");
+    assert!(text(&output.stdout).contains("state hash"));
+
+    let full = || OpenOptions::new().write(true).open("/dev/full").unwrap();
+    for arguments in [run.as_slice(), &["--list"]] {
+        let output = Command::new(program()).args(arguments).stdout(full()).output().unwrap();
+        assert_eq!(output.status.code(), Some(1));
+        assert!(error_line(&output).contains("standard output"));
+    }
+    // Nowhere left to tell it.
+    let status = Command::new(program()).arg("nothing").stderr(full()).status().unwrap();
+    assert_eq!(status.code(), Some(2));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_machine_without_an_adapter() {
+    let run = |backend: &str| {
+        let mut command = Command::new(program());
+        for variable in ["VK_ICD_FILENAMES", "VK_DRIVER_FILES"] {
+            command.env(variable, "/nonexistent");
+        }
+        command.args(["column", "--steps", "2", "--backend", backend]).output().unwrap()
+    };
+    let output = run("gpu");
+    assert_eq!(output.status.code(), Some(1));
+    let line = error_line(&output);
+    assert!(line.contains("no GPU adapter was found") && line.contains("mesa-vulkan-drivers"), "{line}");
+    let output = run("auto");
+    assert!(output.status.success());
+    assert!(text(&output.stderr).contains("running on the CPU"), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("cpu ("));
+}
+
+/// README.md names every field, and its example is the one that the documentation tests run.
+#[test]
+fn the_readme_agrees() {
+    let readme = include_str!("../README.md");
+    for field in FIELDS.iter().chain(&["median", "p95", "max_m", "mean_m"]) {
+        assert!(readme.contains(&format!("`{field}`")), "{field}");
+    }
+    let library: Vec<_> = include_str!("../src/lib.rs")
+        .lines()
+        .skip_while(|line| *line != "//! ```")
+        .skip(1)
+        .take_while(|line| *line != "//! ```")
+        .map(|line| line.trim_start_matches("//!").strip_prefix(' ').unwrap_or(""))
+        .filter(|line| !line.starts_with("# "))
+        .collect();
+    assert!(!library.is_empty() && readme.contains(&format!("```rust\n{}\n```", library.join("\n"))), "{library:?}");
+}

@@ -1,0 +1,207 @@
+//! The same scene gives the same bits: run after run, with any number of threads, in any order of the GPU's
+//! invocations, and with the solver's constraints four at a time or one after the other.
+
+mod common;
+#[path = "common/frame.rs"]
+mod frame;
+#[path = "common/worlds.rs"]
+mod worlds;
+
+use common::gpu;
+use frame::{Cpu, scene_of};
+use tumble::World;
+use tumble_core::glam::Vec3;
+use tumble_core::layout::{Impulse, SolverBody};
+use tumble_core::{ColliderBuilder, Params, RigidBodyBuilder, Scene, measures, scenes};
+use tumble_cpu::solver::{Bodies, Rows, solve, solve_plain};
+use tumble_gpu::Pipelines;
+use worlds::{SIDES, hash, report, steps};
+
+/// Scenes that fall, meet and are not yet at rest, and one whose last batch is solved in sequence.
+fn falling() -> Vec<(&'static str, Scene, usize)> {
+    vec![
+        ("pile", scenes::pile(80), 50),
+        ("mixed", scenes::mixed(90), 50),
+        ("bouncing balls", bouncing(100), 50),
+        ("hub", scenes::hub(150), 10),
+    ]
+}
+
+/// Balls with restitution, dropped into a pit in a heap.
+fn bouncing(bodies: usize) -> Scene {
+    let source = scenes::balls(bodies);
+    let mut scene = Scene::new();
+    for handle in source.bodies() {
+        let body = source.body(handle).unwrap().clone().linvel(Vec3::new(0.5, -3.0, 0.2));
+        let (_, collider) = source.colliders_of(handle).unwrap()[0];
+        scene.insert(body, collider.clone().restitution(0.6));
+    }
+    scene
+}
+
+/// Runs it and says what came of it; whatever is compared must have had something to do.
+fn run(mut world: World, count: usize) -> u64 {
+    steps(&mut world, count);
+    let report = report(&mut world);
+    assert_eq!((report.step, report.lost, report.quarantined), (count as u64, 0, 0), "{report}");
+    assert!(report.contacts > 100, "{report}");
+    hash(&mut world)
+}
+
+/// Oracle: the first run.
+#[test]
+fn three_runs() {
+    for side in SIDES {
+        for (name, scene, count) in falling() {
+            let hashes = [0, 1, 2].map(|_| run(side.world(&scene, &Params::default()), count));
+            assert_eq!(hashes, [hashes[0]; 3], "{name} on {side:?}");
+        }
+    }
+}
+
+/// Other small shifts of the same scene give other bits: the hash sees them.
+#[test]
+fn another_seed_is_another_hash() {
+    for side in SIDES {
+        let runs = [1, 2].map(|seed| run(side.world(&scenes::pile_seeded(80, seed), &Params::default()), 50));
+        assert_ne!(runs[0], runs[1], "{side:?}");
+    }
+}
+
+/// Oracle: one thread. Enough bodies that every parallel pass has work for several.
+#[test]
+fn any_number_of_threads() {
+    let scenes = falling().into_iter().chain([("large mixed", scenes::mixed(3000), 60)]);
+    for (name, scene, count) in scenes {
+        let hashes = [1, 2, 4].map(|threads| {
+            let params = Params { threads: Some(threads), ..Params::default() };
+            let world = worlds::Side::Cpu.world(&scene, &params);
+            run(world, count)
+        });
+        assert_eq!(hashes, [hashes[0]; 3], "{name}");
+    }
+}
+
+/// Oracle: the order in which the driver takes invocations and workgroups. The scene is in its pit and edited on the
+/// way, so that every pass has something to do.
+#[test]
+fn any_order_of_invocations() {
+    for (name, scene, count) in falling() {
+        let hashes = [0, 1, 2].map(|permute| {
+            let pipelines = Pipelines::permuted(permute);
+            let params = Params::default();
+            let world = tumble_gpu::World::with_pipelines(gpu().clone(), pipelines, scene.clone(), params);
+            let mut world = World::Gpu(Box::new(world.unwrap()));
+            steps(&mut world, count / 2);
+            let handles: Vec<_> = world.scene().bodies().collect();
+            for (i, &body) in handles.iter().enumerate().skip(5).step_by(7) {
+                let edit = world.edit();
+                match i % 3 {
+                    0 => edit.apply_impulse(body, Vec3::new(300.0, 900.0, -200.0)).unwrap(),
+                    1 => edit.remove(body).unwrap(),
+                    _ => drop(edit.attach(body, ColliderBuilder::ball(0.3).translation(Vec3::Y * 0.4)).unwrap()),
+                }
+            }
+            for i in 0..300 {
+                let place = Vec3::new((i % 7) as f32 - 3.0, 12.0 + (i / 49) as f32, (i / 7 % 7) as f32 - 3.0);
+                let body = RigidBodyBuilder::dynamic().translation(place).linvel(Vec3::NEG_Y);
+                world.edit().insert(body, ColliderBuilder::ball(0.25)).unwrap();
+            }
+            run_on(world, count)
+        });
+        assert_eq!(hashes, [hashes[0]; 3], "{name}");
+    }
+}
+
+/// To step `count`.
+fn run_on(mut world: World, count: usize) -> u64 {
+    let done = report(&mut world).step as usize;
+    steps(&mut world, count - done);
+    assert!(report(&mut world).contacts > 100);
+    hash(&mut world)
+}
+
+/// A solved step's bodies, and the impulses of every point in use.
+type Solved = (Vec<SolverBody>, Vec<Vec<[u32; 3]>>);
+
+fn bits(impulse: &Impulse) -> [u32; 3] {
+    [impulse.normal, impulse.tangent[0], impulse.tangent[1]].map(f32::to_bits)
+}
+
+/// Oracle: the mirror within the CPU side, constraints one after the other.
+#[test]
+fn four_at_a_time() {
+    let scenes = [
+        ("2", scene_of(2), 3),
+        ("mixed", scenes::mixed(300), 80),
+        ("bouncing balls", bouncing(200), 70),
+        ("pile", scenes::pile(150), 90),
+        ("hub", scenes::hub(200), 5),
+        ("pyramid", scenes::pyramid(15), 5),
+    ];
+    for (name, scene, count) in scenes {
+        let cpu = Cpu::after(&scene, count);
+        for recolor in [false, true] {
+            let frame = cpu.plan(recolor);
+            let (start, order) = (&frame.batches.start, &frame.batches.order);
+            assert!(!order.is_empty(), "{name} has no contact");
+            let plain: Solved = {
+                let mut bodies = cpu.bodies(&frame);
+                let mut rows = cpu.rows(&frame, &bodies);
+                let moving = Bodies { solver: &mut bodies, states: &frame.states, props: &cpu.props };
+                solve_plain(&mut rows, moving, &frame.step, true);
+                let used = rows.heads.iter().zip(rows.impulses.chunks_exact(4));
+                (bodies, used.map(|(head, own)| own[..head.count as usize].iter().map(bits).collect()).collect())
+            };
+            let lanes: Solved = {
+                let mut bodies = cpu.bodies(&frame);
+                let made = cpu.rows(&frame, &bodies);
+                let (heads, points, impulses) = (&made.heads, &made.points, &made.impulses);
+                let mut rows = Rows::default();
+                rows.build(start, |c| {
+                    let four = 4 * c..4 * c + 4;
+                    (heads[c], points[four.clone()].try_into().unwrap(), impulses[four].try_into().unwrap())
+                });
+                let moving = Bodies { solver: &mut bodies, states: &frame.states, props: &cpu.props };
+                solve(&mut rows, moving, &frame.step, true);
+                let mut used = vec![Vec::new(); order.len()];
+                rows.for_each_impulse(|c, point, normal, tangent| {
+                    if point < heads[c].count as usize {
+                        used[c].push(bits(&Impulse { normal, tangent, feature: 0 }));
+                    }
+                });
+                (bodies, used)
+            };
+            for (i, (four, one)) in lanes.0.iter().zip(&plain.0).enumerate() {
+                assert_eq!(bytemuck::bytes_of(four), bytemuck::bytes_of(one), "{name}: body {i}: {four:?} {one:?}");
+            }
+            assert_eq!(lanes.1, plain.1, "{name}");
+            let last = start[start.len() - 1] - start[start.len() - 2];
+            assert_eq!(last > 0, name == "hub", "{name}: {last} in the last batch");
+        }
+    }
+}
+
+/// Reading poses and reports in between changes nothing, on either side. Oracle: a run that reads nothing.
+#[test]
+fn looking_changes_nothing() {
+    for side in SIDES {
+        let blind = run(side.world(&scenes::mixed(100), &Params::default()), 60);
+        let mut world = side.world(&scenes::mixed(100), &Params { profile: true, ..Params::default() });
+        for step in 0..60 {
+            world.step().unwrap();
+            match step % 5 {
+                0 => drop(report(&mut world)),
+                1 => drop(world.poses().unwrap()),
+                2 => drop(world.try_poses().unwrap()),
+                3 => drop(measures::kinetic_energy(
+                    &scenes::mixed(100),
+                    &world.poses().unwrap(),
+                    &world.velocities().unwrap(),
+                )),
+                _ => {}
+            }
+        }
+        assert_eq!(hash(&mut world), blind, "{side:?}");
+    }
+}
