@@ -106,6 +106,10 @@ fn apply_to_body(record: EditRecord, state: ptr<function, BodyState>, own_props:
             *own_props = read_props(record);
         }
         case EDIT_PROPS: {
+            if record.kind == 1u {
+                *own_props = read_props(record);
+                return;
+            }
             let old_com = xyz(record.data[5]);
             let old_frame = xyzw(record.data[6]);
             let position = (*state).position;

@@ -57,7 +57,7 @@ fn visit(kind: u32, c: u32) {
             bounce(head.restitution, head.normal, &point, &impulse, &a, &b, step);
             impulses[p].normal = impulse.normal;
         } else {
-            // Both seldom change, and a write that is not made costs nothing.
+            // These two seldom change, and a write that is not made costs nothing.
             let highest = point.max_impulse;
             push_normal(kind, head, &point, &impulse, &a, &b, step);
             impulses[p].normal = impulse.normal;

@@ -56,6 +56,11 @@ impl Editor {
         self.scene.colliders.len()
     }
 
+    /// Records that the next step must have room for.
+    pub fn edit_count(&self) -> usize {
+        self.records.len()
+    }
+
     /// Adds a body with its first collider.
     pub fn insert(&mut self, body: RigidBodyBuilder, collider: ColliderBuilder) -> Result<Inserted> {
         let inserted = self.scene.try_insert(body, collider)?;
@@ -81,6 +86,7 @@ impl Editor {
         let (_, before, _) = pack_body(&self.scene, body)?;
         let handle = self.scene.attach(body, collider)?;
         self.widen();
+        self.restore_props(body, &before);
         let (_, props, colliders) = pack_body(&self.scene, body)?;
         let mut record = self.props_record(edit_op::PROPS, body, &props);
         record.data[5] = pad(before.center_of_mass).map(f32::to_bits);
@@ -192,6 +198,24 @@ impl Editor {
             }
         }
         EditBatch { records, ranges }
+    }
+
+    /// Takes edits back that were handed over for a step that did not run, before those made since.
+    pub fn put_back(&mut self, batch: EditBatch) {
+        self.records.splice(..0, batch.records);
+    }
+
+    /// Before the first of the body's edits in this step goes a record of its properties, where there is none yet: a
+    /// step that is run again finds those that the later edits left.
+    fn restore_props(&mut self, body: BodyHandle, props: &BodyProps) {
+        let own = |record: &EditRecord| record.op < edit_op::COLLIDER && record.target == body.slot;
+        let begins = |record: &EditRecord| matches!(record.op, edit_op::SPAWN | edit_op::PROPS);
+        if let Some(first) = self.records.iter().position(own)
+            && !self.records.iter().any(|record| own(record) && begins(record))
+        {
+            let record = EditRecord { kind: 1, ..self.props_record(edit_op::PROPS, body, props) };
+            self.records.insert(first, record);
+        }
     }
 
     fn widen(&mut self) {

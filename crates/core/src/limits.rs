@@ -1,5 +1,7 @@
 //! Bounds that both sides share: of loops, which some drivers cut short in silence, and of buffers.
 
+use crate::error::{Error, Result};
+use crate::layout::{BodyState, Collider, EditRecord};
 use crate::params::Capacities;
 
 /// Rounds of placing before the rest goes to the last batch; each round places at least one constraint, and in
@@ -25,6 +27,59 @@ pub fn large_limit(colliders: u32) -> u32 {
 /// Room in the pair list at first.
 pub fn initial_pairs(capacities: &Capacities, colliders: u32) -> u32 {
     capacities.pairs.unwrap_or_else(|| colliders.saturating_mul(8).max(1024))
+}
+
+/// Room for what edits bring: bodies, colliders and the edits themselves, in elements. The same on both sides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Room {
+    /// Slots of bodies.
+    pub bodies: u32,
+    /// Slots of colliders.
+    pub colliders: u32,
+    /// Records of one step's edits.
+    pub edits: u32,
+}
+
+impl Room {
+    /// Room at first, for a scene of so many slots.
+    pub fn first(capacities: &Capacities, bodies: u32, colliders: u32) -> Self {
+        Self {
+            bodies: bodies.max(capacities.bodies.unwrap_or(1)),
+            colliders: colliders.max(capacities.colliders.unwrap_or(1)),
+            edits: capacities.edits.unwrap_or(256),
+        }
+    }
+
+    /// Room for what a step needs, where that is allowed, and the names of what grew.
+    ///
+    /// # Errors
+    /// [`Error::Capacity`] names what may not grow.
+    pub fn grown(&self, needed: &Room, capacities: &Capacities) -> Result<(Self, Vec<&'static str>)> {
+        let (mut room, mut names) = (*self, Vec::new());
+        for (buffer, capacity, needed, bytes) in [
+            ("bodies", &mut room.bodies, needed.bodies, size_of::<BodyState>()),
+            ("colliders", &mut room.colliders, needed.colliders, size_of::<Collider>()),
+            ("edits", &mut room.edits, needed.edits, size_of::<EditRecord>()),
+        ] {
+            if needed > *capacity {
+                *capacity = more(buffer, needed.into(), *capacity, bytes as u64, capacities)?;
+                names.push(buffer);
+            }
+        }
+        Ok((room, names))
+    }
+}
+
+/// Room to make in `buffer`, whose widest array has `bytes` an element, when `needed` did not fit.
+///
+/// # Errors
+/// [`Error::Capacity`] when it may not grow so far.
+pub fn more(buffer: &'static str, needed: u64, capacity: u32, bytes: u64, capacities: &Capacities) -> Result<u32> {
+    let room = grown(needed);
+    if !capacities.grow || room * bytes > capacities.max_array_bytes || room > u64::from(u32::MAX >> 6) {
+        return Err(Error::Capacity { buffer, needed, capacity: capacity.into() });
+    }
+    Ok(room as u32)
 }
 
 /// Room to make when `needed` elements did not fit: a quarter more, so that a growing scene does not grow its buffers

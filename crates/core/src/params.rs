@@ -16,11 +16,17 @@ pub enum Broadphase {
     Grid,
 }
 
-/// Room in the buffers whose need is known only while a step runs.
+/// Room in buffers at first, and whether there may be more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacities {
     /// Pairs of overlapping bounding boxes; `None`: eight a collider, at least 1,024.
     pub pairs: Option<u32>,
+    /// Slots of bodies, where the scene has fewer; `None`: those of the scene.
+    pub bodies: Option<u32>,
+    /// Slots of colliders, where the scene has fewer; `None`: those of the scene.
+    pub colliders: Option<u32>,
+    /// Edits between two steps, each call of the editor counted by what it changes; `None`: 256.
+    pub edits: Option<u32>,
     /// Whether buffers may grow when a step needs more; else [`Error::Capacity`](crate::Error::Capacity).
     pub grow: bool,
     /// No single array grows past this many bytes (a GPU's binding limit, 128 MiB by default, may lie below it).
@@ -29,7 +35,7 @@ pub struct Capacities {
 
 impl Default for Capacities {
     fn default() -> Self {
-        Self { pairs: None, grow: true, max_array_bytes: 2 << 30 }
+        Self { pairs: None, bodies: None, colliders: None, edits: None, grow: true, max_array_bytes: 2 << 30 }
     }
 }
 
@@ -120,8 +126,15 @@ impl Params {
         if let Some(threads) = self.threads {
             check((1..=1024).contains(&threads), what, "threads", threads, "1 to 1024")?;
         }
-        if let Some(pairs) = self.capacities.pairs {
-            check((1..=1 << 26).contains(&pairs), what, "capacities.pairs", pairs, "1 to 67,108,864")?;
+        let Capacities { pairs, bodies, colliders, edits, .. } = self.capacities;
+        for (field, capacity) in [
+            ("capacities.pairs", pairs),
+            ("capacities.bodies", bodies),
+            ("capacities.colliders", colliders),
+            ("capacities.edits", edits),
+        ] {
+            let capacity = capacity.unwrap_or(1);
+            check((1..=1 << 26).contains(&capacity), what, field, capacity, "1 to 67,108,864")?;
         }
         Ok(())
     }

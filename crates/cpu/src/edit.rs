@@ -45,6 +45,7 @@ fn apply_to_body(record: &EditRecord, state: &mut BodyState, props: &mut BodyPro
             state.generation = record.generation;
             *props = read_props(record);
         }
+        edit_op::PROPS if record.kind == 1 => *props = read_props(record),
         edit_op::PROPS => {
             let (old_com, old_frame) = (xyz(record.data[5]), xyzw(record.data[6]));
             let position = vec3(state.position);

@@ -13,7 +13,7 @@ use tumble_core::layout::{
     Aabb, BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Control, FoundManifold, Impulse, Manifold,
     Pair, PoseRecord, QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, body_flags,
 };
-use tumble_core::limits;
+use tumble_core::limits::{self, Room};
 use tumble_core::{Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
 
 /// A simulation on the CPU.
@@ -22,11 +22,10 @@ pub struct World {
     params: Params,
     pool: rayon::ThreadPool,
     kept: Kept,
-    /// A step that could not be committed: run again before the next one.
-    waiting: Option<(EditBatch, StepParams)>,
+    room: Room,
     report: StepReport,
     adapter: String,
-    growths: u32,
+    growths: Vec<(&'static str, u32)>,
     drop_pair: u32,
 }
 
@@ -109,16 +108,17 @@ impl World {
             found: Vec::new(),
             rows: Rows::default(),
         };
-        kept.reserve_pairs(limits::initial_pairs(&params.capacities, kept.colliders.len() as u32));
+        let (bodies, colliders) = (kept.states.len() as u32, kept.colliders.len() as u32);
+        kept.reserve_pairs(limits::initial_pairs(&params.capacities, colliders));
         Ok(Self {
             editor,
+            room: Room::first(&params.capacities, bodies, colliders),
             params,
             pool,
             kept,
-            waiting: None,
             report: StepReport::default(),
             adapter,
-            growths: 0,
+            growths: Vec::new(),
             drop_pair: u32::MAX,
         })
     }
@@ -152,19 +152,33 @@ impl World {
     }
 
     /// Runs one step.
+    ///
+    /// # Errors
+    /// [`Error::Capacity`] when it needs more room than it may have: the step did not run, its edits wait for the next
+    /// call, and the last good state stays readable.
     pub fn step(&mut self) -> Result<()> {
-        if let Some((edits, step)) = self.waiting.take() {
-            self.run(edits, step)?;
-        }
+        let needed = Room {
+            bodies: self.editor.body_slots() as u32,
+            colliders: self.editor.collider_slots() as u32,
+            edits: self.editor.edit_count() as u32,
+        };
+        let (room, grown) = self.room.grown(&needed, &self.params.capacities)?;
+        self.room = room;
+        grown.into_iter().for_each(|buffer| self.count_growth(buffer));
         let edits = self.editor.take();
         let mut step = self.params.step_params(self.kept.control.step + 1, self.editor.scene().gravity);
-        step.body_count = self.editor.body_slots() as u32;
-        step.collider_count = self.editor.collider_slots() as u32;
+        step.body_count = needed.bodies;
+        step.collider_count = needed.colliders;
         step.edit_ranges = edits.ranges.len() as u32;
         step.cell_table_bits = limits::cell_table_bits(step.collider_count);
         step.large_limit = limits::large_limit(step.collider_count);
-        step.drop_pair = std::mem::replace(&mut self.drop_pair, u32::MAX);
-        self.run(edits, step)
+        step.drop_pair = self.drop_pair;
+        if let Err(error) = self.run(&edits, step) {
+            self.editor.put_back(edits);
+            return Err(error);
+        }
+        self.drop_pair = u32::MAX;
+        Ok(())
     }
 
     /// Waits for all steps (here they are done) and returns the last one's report.
@@ -188,40 +202,40 @@ impl World {
     }
 
     /// Plans and commits a step, growing the pair list between where that is needed and allowed.
-    fn run(&mut self, edits: EditBatch, mut step: StepParams) -> Result<()> {
+    fn run(&mut self, edits: &EditBatch, mut step: StepParams) -> Result<()> {
         let restitution = self.editor.plan().restitution;
         loop {
             let mut watch = Stopwatch::new(self.params.profile);
             step.pair_capacity = (self.kept.impulses.len() / 4) as u32;
             let (kept, pool) = (&mut self.kept, &self.pool);
-            let planned = pool.install(|| kept.plan(&edits, &step, &mut watch));
+            let planned = pool.install(|| kept.plan(edits, &step, &mut watch));
             match planned {
                 Ok(planned) => {
                     pool.install(|| kept.commit(planned, &step, restitution, &mut watch));
                     self.finish(watch);
                     return Ok(());
                 }
-                Err(overflow) => {
-                    if let Err(error) = self.grow(overflow) {
-                        self.waiting = Some((edits, step));
-                        return Err(error);
-                    }
-                }
+                Err(overflow) => self.grow(overflow)?,
             }
         }
     }
 
     fn grow(&mut self, overflow: Overflow) -> Result<()> {
         let Overflow { buffer, needed, capacity } = overflow;
-        let error = Error::Capacity { buffer, needed, capacity };
-        let room = limits::grown(needed);
-        let fits = room * limits::BYTES_A_PAIR <= self.params.capacities.max_array_bytes;
-        if buffer != "pairs" || !self.params.capacities.grow || !fits {
-            return Err(error);
+        if buffer != "pairs" {
+            return Err(Error::Capacity { buffer, needed, capacity: capacity.into() });
         }
-        self.kept.reserve_pairs(room as u32);
-        self.growths += 1;
+        let room = limits::more(buffer, needed, capacity, limits::BYTES_A_PAIR, &self.params.capacities)?;
+        self.kept.reserve_pairs(room);
+        self.count_growth(buffer);
         Ok(())
+    }
+
+    fn count_growth(&mut self, buffer: &'static str) {
+        match self.growths.iter_mut().find(|(name, _)| *name == buffer) {
+            Some((_, count)) => *count += 1,
+            None => self.growths.push((buffer, 1)),
+        }
     }
 
     fn finish(&mut self, watch: Stopwatch) {
@@ -229,9 +243,7 @@ impl World {
         report.backend = "cpu";
         report.adapter = self.adapter.clone();
         report.bodies = self.editor.scene().len() as u32;
-        if self.growths > 0 {
-            report.growths = vec![("pairs", self.growths)];
-        }
+        report.growths = self.growths.clone();
         report.memory_bytes = self.kept.bytes();
         report.stages = watch.stages;
         self.report = report;
@@ -242,7 +254,7 @@ impl World {
 struct Overflow {
     buffer: &'static str,
     needed: u64,
-    capacity: u64,
+    capacity: u32,
 }
 
 impl Kept {
@@ -290,7 +302,7 @@ impl Kept {
         control.large_count = cells.large.len() as u32;
         control.cell_class = grid.cell_class;
         let over = |buffer, needed: u32, capacity: u32| {
-            Err(Overflow { buffer, needed: needed as u64, capacity: capacity as u64 })
+            Err(Overflow { buffer, needed: needed.into(), capacity })
         };
         if grid::too_crowded(&found) {
             return over("cell", found.most_candidates, limits::CELL_LOOP_LIMIT);

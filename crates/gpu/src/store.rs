@@ -115,7 +115,7 @@ fn count(per: Per, sizes: &Sizes) -> u64 {
 }
 
 /// Creates every buffer and loads the scene.
-pub(crate) fn create(gpu: &Gpu, packed: &PackedScene, sizes: &Sizes) -> Result<Buffers> {
+pub(crate) fn create(gpu: &Gpu, packed: &PackedScene, sizes: &Sizes, edits: u32) -> Result<Buffers> {
     let mut buffers = Buffers::new();
     let (storage, uniform) = (BufferUsages::STORAGE, BufferUsages::UNIFORM);
     for (name, bytes, per, _) in ARRAYS {
@@ -127,8 +127,8 @@ pub(crate) fn create(gpu: &Gpu, packed: &PackedScene, sizes: &Sizes) -> Result<B
     buffers.create(gpu, "step", size_of::<StepParams>() as u64, 1, uniform)?;
     buffers.create(gpu, "class_histogram", 4, 1024, storage)?;
     buffers.create(gpu, "dispatch_args", 16, args::COUNT, storage | BufferUsages::INDIRECT)?;
-    buffers.create(gpu, "edit_records", size_of::<EditRecord>() as u64, 256, storage)?;
-    buffers.create(gpu, "edit_ranges", size_of::<EditRange>() as u64, 256, storage)?;
+    buffers.create(gpu, "edit_records", size_of::<EditRecord>() as u64, edits.into(), storage)?;
+    buffers.create(gpu, "edit_ranges", size_of::<EditRange>() as u64, edits.into(), storage)?;
     buffers.create(gpu, "indices", 256, 64, uniform)?;
     let indices: Vec<u32> = (0..64 * 64).map(|i| if i % 64 == 0 { i / 64 } else { 0 }).collect();
     let write = |name: &str, bytes: &[u8]| -> Result<()> {

@@ -8,7 +8,8 @@ use bytemuck::Zeroable;
 use std::collections::VecDeque;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{BodyState, Control, PoseRecord, StepParams, overflow};
-use tumble_core::{Editor, Error, Params, Plan, Poses, Result, Scene, StageTime, StepReport, Velocities, limits};
+use tumble_core::limits::{self, Room};
+use tumble_core::{Editor, Error, Params, Plan, Poses, Result, Scene, StageTime, StepReport, Velocities};
 
 /// Steps in flight before `step` waits.
 const IN_FLIGHT: usize = 3;
@@ -28,6 +29,8 @@ pub struct World {
     buffers: Buffers,
     stages: Stages,
     sizes: Sizes,
+    /// Records that the buffers of edits have room for.
+    edit_room: u32,
     built: Plan,
     cache: BindCache,
     timer: Option<Timer>,
@@ -88,8 +91,9 @@ impl World {
         let (editor, packed) = Editor::new(scene)?;
         let (bodies, colliders) = (packed.states.len() as u32, packed.colliders.len() as u32);
         let pairs = limits::initial_pairs(&params.capacities, colliders);
-        let sizes = Sizes { bodies: bodies.max(1), colliders: colliders.max(1), pairs };
-        let buffers = store::create(&gpu, &packed, &sizes)?;
+        let room = Room::first(&params.capacities, bodies, colliders);
+        let sizes = Sizes { bodies: room.bodies, colliders: room.colliders, pairs };
+        let buffers = store::create(&gpu, &packed, &sizes, room.edits)?;
         let poses: Vec<PoseRecord> =
             packed.states.iter().zip(&packed.props).map(|(s, p)| PoseRecord::of(s, p)).collect();
         gpu.queue.write_buffer(buffers.buffer("poses")?, 0, bytemuck::cast_slice(&poses));
@@ -118,6 +122,7 @@ impl World {
             buffers,
             stages,
             sizes,
+            edit_room: room.edits,
             timer,
         })
     }
@@ -173,13 +178,13 @@ impl World {
     /// Submits one step. Waits only when three are in flight.
     ///
     /// # Errors
-    /// [`Error::Capacity`] when an earlier step needs more room than it may have: nothing is submitted, and the last
-    /// good state stays readable. [`Error::DeviceLost`], [`Error::OutOfMemory`] and [`Error::Gpu`] from the device.
+    /// [`Error::Capacity`] when this step or an earlier one needs more room than it may have: nothing is submitted, the
+    /// edits wait for the next call, and the last good state stays readable. [`Error::DeviceLost`], [`Error::OutOfMemory`] and [`Error::Gpu`] from the device.
     pub fn step(&mut self) -> Result<()> {
         self.run_waiting()?;
         self.take_statuses(IN_FLIGHT - 1)?;
         let (bodies, colliders) = (self.editor.body_slots() as u32, self.editor.collider_slots() as u32);
-        self.make_room(bodies, colliders)?;
+        self.make_room(Room { bodies, colliders, edits: self.editor.edit_count() as u32 })?;
         let edits = self.editor.take();
         let mut step = self.params.step_params(self.submitted + 1, self.editor.scene().gravity);
         step.body_count = bodies;
@@ -284,8 +289,6 @@ impl World {
 
     fn upload(&mut self, record: &Record) -> Result<()> {
         let edits = &record.edits;
-        self.buffers.grow(&self.gpu, "edit_records", (edits.records.len() as u64).next_power_of_two(), false)?;
-        self.buffers.grow(&self.gpu, "edit_ranges", (edits.ranges.len() as u64).next_power_of_two(), false)?;
         let queue = &self.gpu.queue;
         queue.write_buffer(self.buffers.buffer("step")?, 0, bytemuck::bytes_of(&record.step));
         queue.write_buffer(self.buffers.buffer("edit_records")?, 0, bytemuck::cast_slice(&edits.records));
@@ -353,16 +356,15 @@ impl World {
             _ => ("cell", limits::CELL_LOOP_LIMIT),
         };
         let error = Error::Capacity { buffer, needed, capacity: capacity.into() };
-        let room = limits::grown(needed);
-        let fits = room * limits::BYTES_A_PAIR <= self.params.capacities.max_array_bytes;
-        if buffer != "pairs" || !self.params.capacities.grow || !fits || room > u64::from(u32::MAX >> 6) {
+        if buffer != "pairs" {
             return Err(error);
         }
+        let room = limits::more(buffer, needed, capacity, limits::BYTES_A_PAIR, &self.params.capacities)?;
         let old = self.sizes.pairs;
         let control = self.buffers.buffer("control")?;
         let free_count: u32 = bytemuck::pod_read_unaligned(&read_now(&self.gpu, control, 20, 4)?);
         let free = read_now(&self.gpu, self.buffers.buffer("free_slots")?, 0, 4 * u64::from(free_count))?;
-        let sizes = Sizes { pairs: room as u32, ..self.sizes };
+        let sizes = Sizes { pairs: room, ..self.sizes };
         // On an error some arrays are larger than they must be, and the world is as good as before.
         store::grow(&self.gpu, &mut self.buffers, &sizes)
             .map_err(|e| if matches!(e, Error::Capacity { .. }) { error } else { e })?;
@@ -377,21 +379,27 @@ impl World {
         Ok(())
     }
 
-    /// Makes room for bodies and colliders that edits brought.
-    fn make_room(&mut self, bodies: u32, colliders: u32) -> Result<()> {
-        if bodies <= self.sizes.bodies && colliders <= self.sizes.colliders {
-            return Ok(());
+    /// Makes room for the edits and what they brought.
+    fn make_room(&mut self, needed: Room) -> Result<()> {
+        let Sizes { bodies, colliders, .. } = self.sizes;
+        let room = Room { bodies, colliders, edits: self.edit_room };
+        let (room, grown) = room.grown(&needed, &self.params.capacities)?;
+        if room.edits > self.edit_room {
+            for buffer in ["edit_records", "edit_ranges"] {
+                self.buffers.grow(&self.gpu, buffer, room.edits.into(), false)?;
+            }
+            self.edit_room = room.edits;
         }
+        if (room.bodies, room.colliders) != (bodies, colliders) {
+            self.grow_scene(Sizes { bodies: room.bodies, colliders: room.colliders, ..self.sizes })?;
+        }
+        grown.into_iter().for_each(|buffer| self.count_growth(buffer));
+        Ok(())
+    }
+
+    fn grow_scene(&mut self, sizes: Sizes) -> Result<()> {
         self.take_statuses(0)?;
-        let mut sizes = self.sizes;
-        if bodies > sizes.bodies {
-            sizes.bodies = limits::grown(bodies.into()) as u32;
-            self.count_growth("bodies");
-        }
-        if colliders > sizes.colliders {
-            sizes.colliders = limits::grown(colliders.into()) as u32;
-            self.count_growth("colliders");
-        }
+        let sizes = Sizes { pairs: self.sizes.pairs, ..sizes };
         store::grow(&self.gpu, &mut self.buffers, &sizes)?;
         self.stages = Stages::new(&self.gpu, &mut self.pipelines, &sizes, &self.built)?;
         self.pose_copies = Readback::new(&self.gpu, "pose copy", pose_bytes(&sizes), 1)?;

@@ -6,7 +6,7 @@ pub mod edit_op {
     pub const SPAWN: u32 = 1;
     /// Mass properties change (a collider came): data\[0\] inverse inertia, inverse mass; 1 inertia, gravity scale;
     /// 2 centre of mass, linear damping; 3 frame; 4 angular damping; 5 and 6 centre of mass and frame of before. The
-    /// body's own frame stays where it is.
+    /// body's own frame stays where it is. With `kind` 1 they are those that the body has: its state stays as it is.
     pub const PROPS: u32 = 2;
     /// The body is gone.
     pub const REMOVE: u32 = 3;
@@ -38,7 +38,7 @@ pub struct EditRecord {
     pub op: u32,
     /// Slot of the body or collider.
     pub target: u32,
-    /// Flags of a body that comes to be.
+    /// Flags of a body that comes to be; see `edit_op::PROPS` too.
     pub kind: u32,
     /// Its generation.
     pub generation: u32,
