@@ -1,6 +1,6 @@
 //! One face for the CPU and the GPU world.
 
-use tumble_core::{Editor, Error, Params, Poses, Result, Scene, StepReport, Velocities};
+use tumble_core::{Editor, Params, Poses, Result, Scene, StepReport, Velocities};
 
 /// Where a world runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -53,7 +53,7 @@ impl World {
 
     #[cfg(not(feature = "cpu"))]
     fn cpu(_: Scene, _: Params) -> Result<Self> {
-        Err(Error::NotBuilt { backend: "cpu" })
+        Err(tumble_core::Error::NotBuilt { backend: "cpu" })
     }
 
     #[cfg(feature = "gpu")]
@@ -63,7 +63,7 @@ impl World {
 
     #[cfg(not(feature = "gpu"))]
     fn gpu(_: Scene, _: Params) -> Result<Self> {
-        Err(Error::NotBuilt { backend: "gpu" })
+        Err(tumble_core::Error::NotBuilt { backend: "gpu" })
     }
 
     #[cfg(all(feature = "cpu", feature = "gpu"))]

@@ -1,8 +1,8 @@
-//! Stages `edit`, `bounds` and `broadphase/grid`, each pass alone: the GPU computes what the CPU does, in every order of
-//! invocations. Oracle: the mirror, which makes the inputs too.
+//! Stages `edit`, `bounds` and `broadphase/grid`, each pass alone: the GPU computes what the CPU does, in every order
+//! of invocations. Oracle: the mirror, which makes the inputs too.
 //!
-//! Tolerances are shares of the largest number of a field in one element, or of 1; beside each is the largest error that
-//! was measured (llvmpipe).
+//! Tolerances are shares of the largest number of a field in one element, or of 1; beside each is the largest error
+//! that was measured (llvmpipe).
 
 #[allow(dead_code, reason = "some passes want an index")]
 #[path = "common/alone.rs"]
@@ -32,8 +32,6 @@ use tumble_gpu::primitives::{Count, Scan, ScanOptions, Sort, SortOptions};
 const PERMUTATIONS: [u32; 3] = [0, 1, 2];
 const SIZES: [usize; 7] = [0, 1, 2, 255, 256, 257, 3000];
 const GARBAGE: u32 = 0xdead_beef;
-/// Most large colliders, as in `shaders/broadphase/grid.wgsl`.
-const LARGE_LOOP_LIMIT: usize = 8192;
 /// Words of `Control`.
 const PAIR_COUNT: u32 = 8;
 const CENTER_MIN: usize = 24;
@@ -186,7 +184,7 @@ fn quarantine_takes_the_same_bodies() {
             let mut random = Random::new(seed as u64);
             let crowd = Crowd::new(bodies, 100 + seed as u64);
             let mut states = crowd.states.clone();
-            for (i, state) in states.iter_mut().enumerate() {
+            for state in &mut states {
                 let value = bad[random.below(6) as usize];
                 let axis = random.below(3) as usize;
                 match random.below(10) {
@@ -410,7 +408,7 @@ fn too_many_pairs_or_candidates_stop_the_step() {
     let pairs = grid::find_pairs(&chosen, &grid::fill(&chosen, &crowd, &step), &crowd).pairs.len() as u32;
     // All in one cell, or all outside of every cell, and of one body, so that the CPU need not look at 2.5e9 pairs.
     let crowded = vec![boxed(Vec3::ZERO, Vec3::splat(0.5), 0); limits::CELL_LOOP_LIMIT as usize + 1];
-    let mut endless = vec![boxed(Vec3::ZERO, Vec3::splat(0.5), 0); LARGE_LOOP_LIMIT + 1];
+    let mut endless = vec![boxed(Vec3::ZERO, Vec3::splat(0.5), 0); limits::LARGE_LOOP_LIMIT as usize + 1];
     endless.iter_mut().for_each(|aabb| (aabb.min, aabb.max, aabb.class) = ([-FAR; 3], [FAR; 3], size_class(FAR)));
     for permute in PERMUTATIONS {
         let mut alone = Alone::new(permute);
@@ -426,7 +424,7 @@ fn too_many_pairs_or_candidates_stop_the_step() {
             let control = run_grid(&mut alone, many, &step, &Control::zeroed());
             assert_eq!(raised(&control), [1, overflow::CELL, many.len() as u32, 0]);
         }
-        let step = StepParams { pair_capacity: 10, ..step_of(LARGE_LOOP_LIMIT as u32) };
+        let step = StepParams { pair_capacity: 10, ..step_of(limits::LARGE_LOOP_LIMIT) };
         let control = run_grid(&mut alone, &endless[1..], &step, &Control::zeroed());
         assert_eq!(raised(&control), [0; 4], "as many as may be");
     }

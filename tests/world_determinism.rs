@@ -155,18 +155,13 @@ fn four_at_a_time() {
             };
             let lanes: Solved = {
                 let mut bodies = cpu.bodies(&frame);
-                let made = cpu.rows(&frame, &bodies);
-                let (heads, points, impulses) = (&made.heads, &made.points, &made.impulses);
                 let mut rows = Rows::default();
-                rows.build(start, |c| {
-                    let four = 4 * c..4 * c + 4;
-                    (heads[c], points[four.clone()].try_into().unwrap(), impulses[four].try_into().unwrap())
-                });
+                rows.build(start, &cpu.colliders, &bodies, &frame.step, |c| cpu.contact(&frame, c));
                 let moving = Bodies { solver: &mut bodies, states: &frame.states, props: &cpu.props };
                 solve(&mut rows, moving, &frame.step, true);
                 let mut used = vec![Vec::new(); order.len()];
                 rows.for_each_impulse(|c, point, normal, tangent| {
-                    if point < heads[c].count as usize {
+                    if point < frame.manifolds[order[c] as usize].count as usize {
                         used[c].push(bits(&Impulse { normal, tangent, feature: 0 }));
                     }
                 });

@@ -146,12 +146,16 @@ impl Cpu {
 
     pub(crate) fn rows(&self, frame: &Frame, bodies: &[SolverBody]) -> PlainRows {
         PlainRows::build(0..frame.batches.order.len(), |c| {
-            let index = frame.batches.order[c] as usize;
-            let pair = &frame.matched.pairs[index];
-            let stored = &self.impulses[4 * pair.slot as usize..][..4];
-            let contact = Contact { pair, manifold: &frame.manifolds[index], stored };
-            prepare_constraint(&contact, &self.colliders, bodies, &frame.step)
+            prepare_constraint(&self.contact(frame, c), &self.colliders, bodies, &frame.step)
         })
+    }
+
+    /// What constraint c of the frame is made of.
+    pub(crate) fn contact<'a>(&'a self, frame: &'a Frame, c: usize) -> Contact<'a> {
+        let index = frame.batches.order[c] as usize;
+        let pair = &frame.matched.pairs[index];
+        let stored = &self.impulses[4 * pair.slot as usize..][..4];
+        Contact { pair, manifold: &frame.manifolds[index], stored }
     }
 
     /// Impulses by slot as they are after `rows` were solved; slots without a constraint stay as they are.

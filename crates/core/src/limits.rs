@@ -14,6 +14,9 @@ pub const LAST_LIMIT: u32 = 32_768;
 /// Most candidates around one collider that the grid visits: the same bound.
 pub const CELL_LOOP_LIMIT: u32 = 50_000;
 
+/// Most colliders outside the grid, half-spaces above all: the same bound.
+pub const LARGE_LOOP_LIMIT: u32 = 8192;
+
 /// How large the grid's cell table is for `colliders` colliders: log2 of at least two cells each.
 pub fn cell_table_bits(colliders: u32) -> u32 {
     (colliders.max(1) * 2).next_power_of_two().trailing_zeros().clamp(6, 24)

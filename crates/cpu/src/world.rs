@@ -296,16 +296,14 @@ impl Kept {
         watch.lap("bounds");
         let grid = grid::choose(&aabbs, step);
         let cells = grid::fill(&grid, &aabbs, step);
-        let found = grid::find_pairs(&grid, &cells, &aabbs);
+        let found = grid::find_pairs_up_to(&grid, &cells, &aabbs, step.pair_capacity);
         watch.lap("broadphase");
-        control.pair_count = found.pairs.len() as u32;
+        control.pair_count = found.count.min(u32::MAX.into()) as u32;
         control.large_count = cells.large.len() as u32;
         control.cell_class = grid.cell_class;
-        let over = |buffer, needed: u32, capacity: u32| {
-            Err(Overflow { buffer, needed: needed.into(), capacity })
-        };
-        if grid::too_crowded(&found) {
-            return over("cell", found.most_candidates, limits::CELL_LOOP_LIMIT);
+        let over = |buffer, needed: u32, capacity: u32| Err(Overflow { buffer, needed: needed.into(), capacity });
+        if let Some(crowd) = grid::too_crowded(&found, &cells) {
+            return over("cell", crowd, limits::CELL_LOOP_LIMIT);
         }
         if control.pair_count > step.pair_capacity {
             return over("pairs", control.pair_count, step.pair_capacity);
@@ -382,12 +380,11 @@ impl Kept {
             .with_min_len(512)
             .map(|i| prepare::prepare_body(&states[i], &self.props[i], batches.masks[i]))
             .collect();
-        self.rows.build(&batches.start, |c| {
+        self.rows.build(&batches.start, &self.colliders, &bodies, step, |c| {
             let index = batches.order[c] as usize;
             let pair = &matched.pairs[index];
             let stored = &self.impulses[4 * pair.slot as usize..][..4];
-            let contact = prepare::Contact { pair, manifold: &manifolds[index], stored };
-            prepare::prepare_constraint(&contact, &self.colliders, &bodies, step)
+            prepare::Contact { pair, manifold: &manifolds[index], stored }
         });
         watch.lap("prepare");
         let moving = solver::Bodies { solver: &mut bodies, states: &states, props: &self.props };

@@ -179,7 +179,8 @@ impl World {
     ///
     /// # Errors
     /// [`Error::Capacity`] when this step or an earlier one needs more room than it may have: nothing is submitted, the
-    /// edits wait for the next call, and the last good state stays readable. [`Error::DeviceLost`], [`Error::OutOfMemory`] and [`Error::Gpu`] from the device.
+    /// edits wait for the next call, and the last good state stays readable. [`Error::DeviceLost`],
+    /// [`Error::OutOfMemory`] and [`Error::Gpu`] from the device.
     pub fn step(&mut self) -> Result<()> {
         self.run_waiting()?;
         self.take_statuses(IN_FLIGHT - 1)?;

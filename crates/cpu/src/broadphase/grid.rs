@@ -13,8 +13,9 @@
 use super::meets;
 use crate::bounds::{FAR, size_class};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 use tumble_core::layout::{Aabb, StepParams, aabb_body};
-use tumble_core::limits::CELL_LOOP_LIMIT;
+use tumble_core::limits::{CELL_LOOP_LIMIT, LARGE_LOOP_LIMIT};
 
 /// Classes that a float's exponent and two mantissa bits can tell apart.
 pub const CLASSES: usize = 1024;
@@ -33,8 +34,10 @@ pub struct Grid {
 /// What the grid found.
 #[derive(Debug, Default)]
 pub struct Found {
-    /// (a, b) with a < b, sorted.
+    /// (a, b) with a < b, sorted; worth nothing when there are more than were asked for.
     pub pairs: Vec<[u32; 2]>,
+    /// How many there are.
+    pub count: u64,
     /// Most candidates that one collider had to look at.
     pub most_candidates: u32,
 }
@@ -165,16 +168,27 @@ pub fn fill(grid: &Grid, aabbs: &[Aabb], step: &StepParams) -> Cells {
 /// All pairs. The shader counts, scans, fills and sorts; here each collider lists its partners of higher index in
 /// order, which is the same list.
 pub fn find_pairs(grid: &Grid, cells: &Cells, aabbs: &[Aabb]) -> Found {
+    find_pairs_up_to(grid, cells, aabbs, u32::MAX)
+}
+
+/// The same for a list that has room for `most`: beyond, pairs are counted and not kept.
+pub fn find_pairs_up_to(grid: &Grid, cells: &Cells, aabbs: &[Aabb], most: u32) -> Found {
     const CHUNK: usize = 256;
+    let count = AtomicU64::new(0);
     let chunks: Vec<(Vec<[u32; 2]>, u32)> = (0..aabbs.len().div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
             let mut pairs = Vec::with_capacity(CHUNK * 6);
-            let mut most = 0;
+            let mut candidates = 0;
             for i in chunk * CHUNK..((chunk + 1) * CHUNK).min(aabbs.len()) {
-                most = most.max(partners(grid, cells, aabbs, i as u32, &mut pairs));
+                let before = pairs.len();
+                candidates = candidates.max(partners(grid, cells, aabbs, i as u32, &mut pairs));
+                let own = (pairs.len() - before) as u64;
+                if count.fetch_add(own, Ordering::Relaxed) + own > most.into() {
+                    pairs = Vec::new();
+                }
             }
-            (pairs, most)
+            (pairs, candidates)
         })
         .collect();
     let most_candidates = chunks.iter().map(|c| c.1).max().unwrap_or(0);
@@ -182,7 +196,7 @@ pub fn find_pairs(grid: &Grid, cells: &Cells, aabbs: &[Aabb]) -> Found {
     for (chunk, _) in &chunks {
         pairs.extend_from_slice(chunk);
     }
-    Found { pairs, most_candidates }
+    Found { pairs, count: count.into_inner(), most_candidates }
 }
 
 /// Appends the partners of `i` that have a higher index, in order; returns how many candidates its cells held.
@@ -206,7 +220,9 @@ fn partners(grid: &Grid, cells: &Cells, aabbs: &[Aabb], i: u32, pairs: &mut Vec<
             let index = grid.index(cell);
             let range = cells.start[index] as usize..cells.start[index + 1] as usize;
             candidates += range.len() as u32;
-            cells.entries[range].iter().for_each(|&j| offer(j));
+            if candidates <= CELL_LOOP_LIMIT {
+                cells.entries[range].iter().for_each(|&j| offer(j));
+            }
         }
     } else {
         ((i + 1)..aabbs.len() as u32).filter(|&j| grid.holds(&aabbs[j as usize])).for_each(&mut offer);
@@ -215,7 +231,10 @@ fn partners(grid: &Grid, cells: &Cells, aabbs: &[Aabb], i: u32, pairs: &mut Vec<
     candidates
 }
 
-/// Whether a shader's loop over the candidates would come near its bound.
-pub fn too_crowded(found: &Found) -> bool {
-    found.most_candidates > CELL_LOOP_LIMIT
+/// How many candidates, or colliders outside the grid, there are where a shader's loop over them would come near its
+/// bound; nothing where none does.
+pub fn too_crowded(found: &Found, cells: &Cells) -> Option<u32> {
+    let large = cells.large.len() as u32;
+    let candidates = (found.most_candidates > CELL_LOOP_LIMIT).then_some(found.most_candidates);
+    candidates.max((large > LARGE_LOOP_LIMIT).then_some(large))
 }

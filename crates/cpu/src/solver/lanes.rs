@@ -2,7 +2,7 @@
 
 use crate::shared::Shared;
 use std::ops::{Add, Mul, Sub};
-use tumble_core::layout::{ConstraintHead, ConstraintPoint, Impulse};
+use tumble_core::layout::{ConstraintHead, Impulse, ManifoldPoint};
 use wide::f32x4;
 
 /// Constraints side by side.
@@ -87,6 +87,10 @@ pub(crate) struct ConstraintLanes {
     pub(crate) body_b: [u32; LANES],
     /// Points of the constraint that has most.
     pub(crate) count: usize,
+    /// Points of each, as floats.
+    pub(crate) counts: f32x4,
+    /// From the centre of mass of a to that of b, when the points were found.
+    pub(crate) between: V3,
     pub(crate) normal: V3,
     pub(crate) tangents: [V3; 2],
     pub(crate) friction: f32x4,
@@ -103,38 +107,29 @@ impl ConstraintLanes {
         Self { body_a: [NO_BODY; LANES], body_b: [NO_BODY; LANES], ..Self::default() }
     }
 
-    /// Puts a constraint into a lane.
-    pub(crate) fn fill(
-        &mut self,
-        lane: usize,
-        head: &ConstraintHead,
-        points: &[ConstraintPoint],
-        impulses: &[Impulse],
-    ) {
-        let (t1, t2) = crate::math::tangents(crate::math::vec3(head.normal));
+    /// Puts a constraint's head into a lane.
+    pub(crate) fn set_head(&mut self, lane: usize, head: &ConstraintHead, between: [f32; 3]) {
         self.body_a[lane] = head.body_a;
         self.body_b[lane] = head.body_b;
         self.count = self.count.max(head.count as usize);
+        set(&mut self.counts, lane, head.count as f32);
+        self.between.set(lane, between);
         self.normal.set(lane, head.normal);
-        self.tangents[0].set(lane, t1.to_array());
-        self.tangents[1].set(lane, t2.to_array());
         set(&mut self.friction, lane, head.friction);
         set(&mut self.restitution, lane, head.restitution);
         set(&mut self.bias_rate, lane, head.bias_rate);
         set(&mut self.mass_scale, lane, head.mass_scale);
         set(&mut self.impulse_scale, lane, head.impulse_scale);
-        for ((to, from), impulse) in self.points.iter_mut().zip(points).zip(impulses).take(head.count as usize) {
-            to.anchor_a.set(lane, from.anchor_a);
-            to.anchor_b.set(lane, from.anchor_b);
-            set(&mut to.adjusted_separation, lane, from.adjusted_separation);
-            set(&mut to.normal_mass, lane, from.normal_mass);
-            set(&mut to.tangent_mass, lane, from.tangent_mass);
-            set(&mut to.approach, lane, from.approach);
-            set(&mut to.max_impulse, lane, from.max_impulse);
-            set(&mut to.normal, lane, impulse.normal);
-            set(&mut to.tangent[0], lane, impulse.tangent[0]);
-            set(&mut to.tangent[1], lane, impulse.tangent[1]);
-        }
+    }
+
+    /// Puts a point with its impulse into a lane; masses and the other arm follow for all lanes at once.
+    pub(crate) fn set_point(&mut self, lane: usize, point: usize, at: &ManifoldPoint, impulse: &Impulse) {
+        let to = &mut self.points[point];
+        to.anchor_a.set(lane, at.anchor);
+        set(&mut to.adjusted_separation, lane, at.separation);
+        set(&mut to.normal, lane, impulse.normal);
+        set(&mut to.tangent[0], lane, impulse.tangent[0]);
+        set(&mut to.tangent[1], lane, impulse.tangent[1]);
     }
 
     /// The accumulated impulse of one point of one lane.
@@ -163,19 +158,12 @@ pub(crate) struct BodyLanes {
 const ROWS: usize = 6;
 
 impl BodyLanes {
-    /// Loads four bodies; without their change of pose when `moved` is false.
-    ///
-    /// # Safety
-    /// No other thread writes any of the bodies meanwhile.
+    /// Loads four bodies by `read`, which gives element i of the bodies seen as rows; without their change of pose when
+    /// `moved` is false.
     #[inline(always)]
-    pub(crate) unsafe fn gather(bodies: &Shared<'_, f32x4>, index: [u32; LANES], moved: bool) -> Self {
-        // SAFETY: the caller's promise.
-        let row = |r: usize| unsafe {
-            f32x4::transpose(index.map(|i| match i {
-                NO_BODY => f32x4::ZERO,
-                i => bodies.get(ROWS * i as usize + r),
-            }))
-        };
+    pub(crate) fn gather(read: impl Fn(usize) -> f32x4, index: [u32; LANES], moved: bool) -> Self {
+        let one = |i: u32, r: usize| if i == NO_BODY { f32x4::ZERO } else { read(ROWS * i as usize + r) };
+        let row = |r: usize| f32x4::transpose([one(index[0], r), one(index[1], r), one(index[2], r), one(index[3], r)]);
         let [vx, vy, vz, inverse_mass] = row(0);
         let [wx, wy, wz, touched] = row(1);
         let zero = [f32x4::ZERO; 4];

@@ -8,6 +8,7 @@
 
 mod lanes;
 pub mod prepare;
+mod prepare_lanes;
 pub mod soft;
 mod soft_lanes;
 pub mod store;
@@ -15,9 +16,10 @@ pub mod store;
 use crate::motion;
 use crate::shared::Shared;
 use lanes::{BodyLanes, ConstraintLanes, LANES};
+use prepare::Contact;
 use rayon::prelude::*;
 use tumble_core::layout::{
-    BodyProps, BodyState, ConstraintHead, ConstraintPoint, Impulse, LAST_BATCH, SolverBody, StepParams,
+    BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Impulse, LAST_BATCH, SolverBody, StepParams,
 };
 use wide::f32x4;
 
@@ -74,8 +76,16 @@ pub struct Bodies<'a> {
 }
 
 impl Rows {
-    /// Builds the rows of all constraints; `make(c)` gives constraint c of `start`'s order. Buffers are used again.
-    pub fn build(&mut self, start: &[u32], make: impl Fn(usize) -> PlainConstraint + Sync) {
+    /// Builds the rows of all constraints; `contact(c)` gives what constraint c of `start`'s order is made of. Buffers
+    /// are used again.
+    pub fn build<'c>(
+        &mut self,
+        start: &[u32],
+        colliders: &[Collider],
+        bodies: &[SolverBody],
+        step: &StepParams,
+        contact: impl Fn(usize) -> Contact<'c> + Sync,
+    ) {
         self.group_start.clear();
         self.members.clear();
         for batch in 0..LAST_BATCH as usize {
@@ -86,16 +96,22 @@ impl Rows {
         }
         self.group_start.push(self.members.len());
         self.groups.resize(self.members.len(), ConstraintLanes::empty());
+        let rows = bytemuck::cast_slice::<SolverBody, f32x4>(bodies);
         self.groups.par_iter_mut().zip(&self.members).with_min_len(32).for_each(|(group, &(first, count))| {
             *group = ConstraintLanes::empty();
             for lane in 0..count as usize {
-                let (head, points, impulses) = make(first as usize + lane);
-                group.fill(lane, &head, &points, &impulses);
+                let contact = contact(first as usize + lane);
+                let manifold = contact.manifold;
+                group.set_head(lane, &prepare::prepare_head(&contact, colliders, bodies, step), manifold.between);
+                for point in 0..manifold.count as usize {
+                    group.set_point(lane, point, &manifold.points[point], &prepare::carry(&contact, point));
+                }
             }
+            prepare_lanes::prepare(group, rows);
         });
         let last = start[LAST_BATCH as usize] as usize..start[LAST_BATCH as usize + 1] as usize;
         self.last_first = last.start;
-        self.last = PlainRows::build(last, make);
+        self.last = PlainRows::build(last, |c| prepare::prepare_constraint(&contact(c), colliders, bodies, step));
     }
 
     /// Calls `take(c, point, normal, tangent)` with the impulse of every point, used or not.
@@ -124,9 +140,9 @@ impl Rows {
             groups.par_iter_mut().with_min_len(64).for_each(|group| {
                 // SAFETY: constraints of one batch share no moving body (`batch`), and bodies that do not move are
                 // never written (`scatter`).
-                let mut a = unsafe { BodyLanes::gather(&shared, group.body_a, moved) };
-                // SAFETY: as above.
-                let mut b = unsafe { BodyLanes::gather(&shared, group.body_b, moved) };
+                let read = |i: usize| unsafe { shared.get(i) };
+                let mut a = BodyLanes::gather(read, group.body_a, moved);
+                let mut b = BodyLanes::gather(read, group.body_b, moved);
                 soft_lanes::visit(visit, group, &mut a, &mut b, step);
                 // SAFETY: as above.
                 unsafe { a.scatter(&shared, group.body_a) };

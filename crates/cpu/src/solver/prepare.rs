@@ -52,22 +52,21 @@ pub struct Contact<'a> {
     pub stored: &'a [Impulse],
 }
 
-/// One constraint's head, points and impulses. Impulses carry over to points whose features stayed.
+/// One constraint's head, points and impulses.
 pub fn prepare_constraint(
     contact: &Contact<'_>,
     colliders: &[Collider],
     bodies: &[SolverBody],
     step: &StepParams,
 ) -> PlainConstraint {
+    let manifold = contact.manifold;
+    let head = prepare_head(contact, colliders, bodies, step);
+    let (a, b) = (&bodies[head.body_a as usize], &bodies[head.body_b as usize]);
     let mut points = [ConstraintPoint::zeroed(); 4];
     let mut impulses = [Impulse { normal: 0.0, tangent: [0.0; 2], feature: NO_FEATURE }; 4];
-    let (pair, manifold) = (contact.pair, contact.manifold);
-    let (ca, cb) = (&colliders[pair.a as usize], &colliders[pair.b as usize]);
-    let (a, b) = (&bodies[ca.body as usize], &bodies[cb.body as usize]);
     let normal = vec3(manifold.normal);
     let (t1, t2) = tangents(normal);
     let between = vec3(manifold.between);
-    let fresh = pair.kind & pair_kind::FRESH != 0;
     for i in 0..manifold.count as usize {
         let ra = vec3(manifold.points[i].anchor);
         let rb = ra - between;
@@ -86,21 +85,27 @@ pub fn prepare_constraint(
             max_impulse: 0.0,
             pad_a: 0,
         };
-        let feature = manifold.features[i];
-        impulses[i] = Impulse { normal: 0.0, tangent: [0.0; 2], feature };
-        if !fresh {
-            for stored in contact.stored.iter().filter(|s| s.feature == feature) {
-                impulses[i] = *stored;
-            }
-        }
+        impulses[i] = carry(contact, i);
     }
-    let soft = a.inverse_mass > 0.0 && b.inverse_mass > 0.0;
+    (head, points, impulses)
+}
+
+/// What the points of a constraint share.
+pub(super) fn prepare_head(
+    contact: &Contact<'_>,
+    colliders: &[Collider],
+    bodies: &[SolverBody],
+    step: &StepParams,
+) -> ConstraintHead {
+    let (pair, manifold) = (contact.pair, contact.manifold);
+    let (ca, cb) = (&colliders[pair.a as usize], &colliders[pair.b as usize]);
+    let soft = bodies[ca.body as usize].inverse_mass > 0.0 && bodies[cb.body as usize].inverse_mass > 0.0;
     let (bias_rate, mass_scale, impulse_scale) = if soft {
         (step.bias_rate, step.mass_scale, step.impulse_scale)
     } else {
         (step.static_bias_rate, step.static_mass_scale, step.static_impulse_scale)
     };
-    let head = ConstraintHead {
+    ConstraintHead {
         normal: manifold.normal,
         friction: combined(ca.combine & 3, cb.combine & 3, ca.friction, cb.friction),
         body_a: ca.body,
@@ -111,8 +116,15 @@ pub fn prepare_constraint(
         bias_rate,
         mass_scale,
         impulse_scale,
-    };
-    (head, points, impulses)
+    }
+}
+
+/// The impulse that the slot remembers for a point whose feature stayed.
+pub(super) fn carry(contact: &Contact<'_>, point: usize) -> Impulse {
+    let feature = contact.manifold.features[point];
+    let fresh = contact.pair.kind & pair_kind::FRESH != 0;
+    let stored = contact.stored.iter().rfind(|s| !fresh && s.feature == feature);
+    stored.copied().unwrap_or(Impulse { normal: 0.0, tangent: [0.0; 2], feature })
 }
 
 /// Coefficient of two colliders by the stronger of their rules (`CombineRule`).

@@ -1,0 +1,49 @@
+//! The points of `prepare`, four constraints at a time: the same operations in the same order, so the same results.
+
+use super::lanes::{BodyLanes, ConstraintLanes, V3};
+use wide::f32x4;
+
+/// Fills in what follows from the geometry: tangents, the other arm, masses, approach. `bodies` as rows.
+pub(super) fn prepare(c: &mut ConstraintLanes, bodies: &[f32x4]) {
+    let a = BodyLanes::gather(|i| bodies[i], c.body_a, false);
+    let b = BodyLanes::gather(|i| bodies[i], c.body_b, false);
+    let normal = c.normal;
+    c.tangents = tangents(normal);
+    let [t1, t2] = c.tangents;
+    let half = f32x4::splat(0.5);
+    for (k, p) in c.points[..c.count].iter_mut().enumerate() {
+        let used = c.counts.simd_gt(f32x4::splat(k as f32));
+        let ra = p.anchor_a;
+        let rb = ra - c.between;
+        let along = |u: V3, v: V3| response(&a, &b, ra, rb, u, v);
+        let (k11, k12, k22) = (along(t1, t1), along(t1, t2), along(t2, t2));
+        let apart = f32x4::splat(0.25) * (k11 - k22) * (k11 - k22) + k12 * k12;
+        let stiffest = half * (k11 + k22) + apart.sqrt();
+        p.anchor_b = rb;
+        p.adjusted_separation -= normal.dot(rb - ra);
+        p.normal_mass = used & inverse(along(normal, normal));
+        p.tangent_mass = used & inverse(stiffest);
+        p.approach = normal.dot(b.velocity_at(rb) - a.velocity_at(ra));
+    }
+}
+
+fn tangents(n: V3) -> [V3; 2] {
+    let flat = n.x.abs().simd_lt(f32x4::splat(0.577_350_3));
+    let t = V3::new(flat.bitselect(f32x4::ZERO, n.y), flat.bitselect(n.z, -n.x), flat.bitselect(-n.y, f32x4::ZERO));
+    let length = t.dot(t).sqrt();
+    let t = (f32x4::ONE / length) * t;
+    // A lane without a constraint has no normal, and must not make others' numbers slow or its own infinite.
+    let good = length.simd_gt(f32x4::ZERO);
+    let t = V3::new(good & t.x, good & t.y, good & t.z);
+    [t, n.cross(t)]
+}
+
+fn response(a: &BodyLanes, b: &BodyLanes, ra: V3, rb: V3, u: V3, v: V3) -> f32x4 {
+    let turn_a = a.inverse_inertia_times(ra.cross(u)).cross(ra);
+    let turn_b = b.inverse_inertia_times(rb.cross(u)).cross(rb);
+    (a.inverse_mass + b.inverse_mass) * u.dot(v) + v.dot(turn_a + turn_b)
+}
+
+fn inverse(x: f32x4) -> f32x4 {
+    x.simd_gt(f32x4::ZERO) & (f32x4::ONE / x)
+}
