@@ -19,6 +19,7 @@ const CONTROL_WORDS: u32 = 112u;
 const CLASSES: u32 = 1024u;
 const NO_CLAIM: u32 = 0xffffffffu;
 const LONGEST_RANGE: u32 = 50000u; // turns of one loop
+const STATE_LIMIT: f32 = 1e9; // m/s², rad/s²: as for velocities in bounds.wgsl
 
 @group(0) @binding(0) var<uniform> step: StepParams;
 @group(0) @binding(1) var<uniform> control: Control;
@@ -144,10 +145,10 @@ fn apply_to_body(record: EditRecord, state: ptr<function, BodyState>, own_props:
             push(state, *own_props, a, cross(b - (*state).position, a));
         }
         case EDIT_FORCE: {
-            pull(state, a, b);
+            pull(state, *own_props, a, b);
         }
         case EDIT_FORCE_AT: {
-            pull(state, a, cross(b - (*state).position, a));
+            pull(state, *own_props, a, cross(b - (*state).position, a));
         }
         default: {
             (*state).flags |= BODY_FROZEN;
@@ -166,10 +167,21 @@ fn push(state: ptr<function, BodyState>, own_props: BodyProps, impulse: vec3<f32
     (*state).angular_velocity = (*state).angular_velocity + turn;
 }
 
-// Adds a force and a torque for the step.
-fn pull(state: ptr<function, BodyState>, force: vec3<f32>, torque: vec3<f32>) {
+// Adds a force and a torque for the step. What would make the body explode within the step puts it in quarantine before
+// it meets others.
+fn pull(state: ptr<function, BodyState>, own_props: BodyProps, force: vec3<f32>, torque: vec3<f32>) {
     (*state).force = (*state).force + force;
     (*state).torque = (*state).torque + torque;
+    let linear = (*state).force * own_props.inverse_mass;
+    let angular = own_props.inverse_inertia * rotate_back((*state).rotation, (*state).torque);
+    if !small(linear) || !small(angular) {
+        (*state).flags |= BODY_FROZEN;
+    }
+}
+
+// Whether an acceleration is none that only an explosion has.
+fn small(v: vec3<f32>) -> bool {
+    return is_finite3(v) && max_element(abs(v)) <= STATE_LIMIT;
 }
 
 fn read_props(record: EditRecord) -> BodyProps {

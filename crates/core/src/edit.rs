@@ -5,7 +5,7 @@ use crate::builder::{ColliderBuilder, RigidBodyBuilder, check_finite, check_posi
 use crate::error::{Result, check};
 use crate::handle::{BodyHandle, ColliderHandle, Inserted};
 use crate::layout::{BodyProps, Collider, EditRange, EditRecord, edit_op};
-use crate::packed::{PackedScene, pack_body};
+use crate::packed::{PackedBody, PackedScene, pack_body};
 use crate::plan::Plan;
 use crate::poses::Pose;
 use crate::scene::Scene;
@@ -65,7 +65,7 @@ impl Editor {
     pub fn insert(&mut self, body: RigidBodyBuilder, collider: ColliderBuilder) -> Result<Inserted> {
         let inserted = self.scene.try_insert(body, collider)?;
         self.widen();
-        let (state, props, colliders) = pack_body(&self.scene, inserted.body)?;
+        let PackedBody { state, props, colliders } = pack_body(&self.scene, inserted.body)?;
         let mut spawn = self.props_record(edit_op::SPAWN, inserted.body, &props);
         spawn.kind = state.flags;
         spawn.generation = state.generation;
@@ -83,11 +83,11 @@ impl Editor {
     /// Adds a further collider to a body; mass and inertia follow, the body's own frame and motion stay. Its contacts
     /// are found anew.
     pub fn attach(&mut self, body: BodyHandle, collider: ColliderBuilder) -> Result<ColliderHandle> {
-        let (_, before, _) = pack_body(&self.scene, body)?;
+        let before = pack_body(&self.scene, body)?.props;
         let handle = self.scene.attach(body, collider)?;
         self.widen();
         self.restore_props(body, &before);
-        let (_, props, colliders) = pack_body(&self.scene, body)?;
+        let PackedBody { props, colliders, .. } = pack_body(&self.scene, body)?;
         let mut record = self.props_record(edit_op::PROPS, body, &props);
         record.data[5] = pad(before.center_of_mass).map(f32::to_bits);
         record.data[6] = before.frame.map(f32::to_bits);

@@ -38,10 +38,10 @@ impl PackedScene {
             plan: Plan::of(scene),
         };
         for body in scene.bodies() {
-            let (state, props, colliders) = pack_body(scene, body)?;
-            packed.states[body.slot()] = state;
-            packed.props[body.slot()] = props;
-            for (slot, collider) in colliders {
+            let own = pack_body(scene, body)?;
+            packed.states[body.slot()] = own.state;
+            packed.props[body.slot()] = own.props;
+            for (slot, collider) in own.colliders {
                 packed.colliders[slot] = collider;
             }
         }
@@ -49,8 +49,15 @@ impl PackedScene {
     }
 }
 
-/// State, properties and colliders (by slot) of one body.
-pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<(BodyState, BodyProps, Vec<(usize, Collider)>)> {
+/// One body as a backend stores it.
+pub(crate) struct PackedBody {
+    pub(crate) state: BodyState,
+    pub(crate) props: BodyProps,
+    /// By slot.
+    pub(crate) colliders: Vec<(usize, Collider)>,
+}
+
+pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<PackedBody> {
     let builder = &scene.entry(body)?.builder;
     let dynamic = builder.body_type == RigidBodyType::Dynamic;
     // What nothing pushes keeps its own frame: its mass is never used.
@@ -110,7 +117,7 @@ pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<(BodyState, B
             (handle.slot(), collider)
         })
         .collect();
-    Ok((state, props, colliders))
+    Ok(PackedBody { state, props, colliders })
 }
 
 fn body_kind(body_type: RigidBodyType) -> u32 {

@@ -3,6 +3,7 @@
 //! `begin` copies the committed states, `apply` runs one range of records, those of one body or collider. Writes to
 //! properties and colliders are absolute, so that a step that is run again finds what it would have found.
 
+use crate::bounds::STATE_LIMIT;
 use crate::math::{finite, quat, rotate, rotate_back, vec3};
 use glam::{Quat, Vec3};
 use tumble_core::layout::{BodyProps, BodyState, Collider, EditRange, EditRecord, body_flags, edit_op};
@@ -73,8 +74,8 @@ fn apply_to_body(record: &EditRecord, state: &mut BodyState, props: &mut BodyPro
         }
         edit_op::IMPULSE => push(state, props, a, b),
         edit_op::IMPULSE_AT => push(state, props, a, (b - vec3(state.position)).cross(a)),
-        edit_op::FORCE => pull(state, a, b),
-        edit_op::FORCE_AT => pull(state, a, (b - vec3(state.position)).cross(a)),
+        edit_op::FORCE => pull(state, props, a, b),
+        edit_op::FORCE_AT => pull(state, props, a, (b - vec3(state.position)).cross(a)),
         _ => {
             state.flags |= body_flags::FROZEN;
             state.linear_velocity = [0.0; 3];
@@ -92,10 +93,21 @@ fn push(state: &mut BodyState, props: &BodyProps, impulse: Vec3, angular: Vec3) 
     state.angular_velocity = (vec3(state.angular_velocity) + turn).to_array();
 }
 
-/// Adds a force and a torque for the step.
-fn pull(state: &mut BodyState, force: Vec3, torque: Vec3) {
+/// Adds a force and a torque for the step. What would make the body explode within the step puts it in quarantine
+/// before it meets others.
+fn pull(state: &mut BodyState, props: &BodyProps, force: Vec3, torque: Vec3) {
     state.force = (vec3(state.force) + force).to_array();
     state.torque = (vec3(state.torque) + torque).to_array();
+    let linear = (vec3(state.force) * props.inverse_mass).to_array();
+    let angular = (vec3(props.inverse_inertia) * rotate_back(quat(state.rotation), vec3(state.torque))).to_array();
+    if !small(linear) || !small(angular) {
+        state.flags |= body_flags::FROZEN;
+    }
+}
+
+/// Whether an acceleration is none that only an explosion has.
+fn small(v: [f32; 3]) -> bool {
+    finite(v) && vec3(v).abs().max_element() <= STATE_LIMIT
 }
 
 fn read_props(record: &EditRecord) -> BodyProps {

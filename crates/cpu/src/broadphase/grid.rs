@@ -64,7 +64,7 @@ fn center(aabb: &Aabb) -> [f32; 3] {
 
 /// 1 / (17/16 of the class's upper edge): a table for the mantissa, a power of two for the exponent.
 pub fn inverse_cell(class: u32) -> f32 {
-    const MANTISSA: [f32; 4] = [0.941_176_47, 0.752_941_2, 0.627_451, 0.537_815_15];
+    const MANTISSA: [f32; 4] = [0.941_176_5, 0.752_941_2, 0.627_451, 0.537_815_15];
     let exponent = class >> 2;
     if class == 0 || exponent >= 254 {
         return 0.0;

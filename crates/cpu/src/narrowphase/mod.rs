@@ -92,10 +92,11 @@ pub fn collide(
     let couple = place(pair, colliders, states, step);
     let kind = pair.kind & pair_kind::MASK;
     let boxes = kind == pair_kind::CUBOID_CUBOID || kind == pair_kind::CUBOID_HALFSPACE;
-    if boxes && pair.kind & pair_kind::FRESH == 0 {
-        if let Some(manifold) = recycle::recycle(&couple, found) {
-            return manifold;
-        }
+    if boxes
+        && pair.kind & pair_kind::FRESH == 0
+        && let Some(manifold) = recycle::recycle(&couple, found)
+    {
+        return manifold;
     }
     let swapped = colliders[pair.a as usize].shape > colliders[pair.b as usize].shape;
     let mut manifold = match kind {
