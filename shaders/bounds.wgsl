@@ -145,17 +145,26 @@ fn bounds_of(collider: Collider) -> Aabb {
     return Aabb(lowest, body, highest, size_class(max_element(highest - lowest)));
 }
 
+// What a rotation's rounding leaves of the other two components when a normal is meant to be an axis, and the room that
+// such a tilt needs 10 km away, m.
+const TILT: f32 = 1e-6;
+const TILT_MARGIN: f32 = 0.01;
+
 // A half-space has a tight box only when its normal is an axis; else it meets every box, and the narrow phase
 // decides. (A slanted test would be a sum of products, which a driver may fuse: sides would disagree.)
 fn halfspace_bounds(middle: vec3<f32>, normal: vec3<f32>, body: u32) -> Aabb {
     var lowest = vec3<f32>(-FAR);
     var highest = vec3<f32>(FAR);
-    let margin = 0.5 * step.speculative_distance;
+    let margin = 0.5 * step.speculative_distance + TILT_MARGIN;
     for (var axis = 0u; axis < 3u; axis++) {
-        if normal[axis] == 1.0 {
-            highest[axis] = middle[axis] + margin;
+        let u = normal[(axis + 1u) % 3u];
+        let v = normal[(axis + 2u) % 3u];
+        if abs(u) > TILT || abs(v) > TILT {
+            continue;
         }
-        if normal[axis] == -1.0 {
+        if normal[axis] > 0.0 {
+            highest[axis] = middle[axis] + margin;
+        } else {
             lowest[axis] = middle[axis] - margin;
         }
     }

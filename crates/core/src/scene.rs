@@ -4,6 +4,7 @@ use crate::builder::{ColliderBuilder, RigidBodyBuilder, RigidBodyType};
 use crate::error::{Error, Result, check};
 use crate::handle::{BodyHandle, ColliderHandle, Inserted, Slots};
 use crate::mass::MassProperties;
+use crate::shape::Shape;
 use glam::Vec3;
 
 /// Most bodies or colliders in one scene: an index must fit beside two flags.
@@ -171,7 +172,8 @@ fn check_mass<'a>(
     if body.body_type != RigidBodyType::Dynamic {
         return Ok(());
     }
-    let mass = MassProperties::of(colliders);
+    let colliders: Vec<_> = colliders.collect();
+    let mass = MassProperties::of(colliders.iter().copied());
     let fits = |x: f32| (1e-18..=1e18).contains(&x);
     check(
         fits(mass.mass),
@@ -179,6 +181,14 @@ fn check_mass<'a>(
         "mass",
         mass.mass,
         "a dynamic body has a ball or cuboid and weighs 1e-18 to 1e18 kg",
+    )?;
+    let endless = colliders.iter().any(|c| matches!(c.shape, Shape::HalfSpace { .. }));
+    check(
+        !endless,
+        &what,
+        "shape",
+        "a half-space",
+        "a ball or cuboid: a half-space has no mass, and only fixed and kinematic bodies carry one",
     )?;
     let inertia = mass.principal_inertia.to_array();
     check(

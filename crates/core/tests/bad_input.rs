@@ -116,6 +116,9 @@ fn a_dynamic_body_weighs_something() {
     refused(RigidBodyBuilder::dynamic(), ColliderBuilder::ball(1e6).density(1e12), "mass");
     refused(RigidBodyBuilder::dynamic(), ColliderBuilder::ball(1e-6).mass(1e-18), "inertia");
     let mut scene = Scene::new();
+    let body = scene.insert(RigidBodyBuilder::dynamic(), ColliderBuilder::ball(1.0)).body;
+    let error = scene.attach(body, ColliderBuilder::halfspace(Vec3::Y)).unwrap_err();
+    assert!(error.to_string().contains("shape is"), "{error}");
     scene.try_insert(RigidBodyBuilder::fixed(), ColliderBuilder::halfspace(Vec3::Y)).unwrap();
     scene.try_insert(RigidBodyBuilder::kinematic_velocity_based(), ColliderBuilder::halfspace(Vec3::Y)).unwrap();
 }

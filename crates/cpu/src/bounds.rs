@@ -89,16 +89,24 @@ pub fn collider_bounds(collider: &Collider, state: &BodyState, props: &BodyProps
     Aabb { min: min.to_array(), body, max: max.to_array(), class: size_class((max - min).max_element()) }
 }
 
+/// What a rotation's rounding leaves of the other two components when a normal is meant to be an axis, and the room that
+/// such a tilt needs 10 km away, m.
+const TILT: f32 = 1e-6;
+const TILT_MARGIN: f32 = 0.01;
+
 /// A half-space has a tight box only when its normal is an axis; else it meets every box, and the narrow phase
 /// decides. (A slanted test would be a sum of products, which a driver may fuse: sides would disagree.)
 fn halfspace_bounds(center: Vec3, normal: Vec3, body: u32, step: &StepParams) -> Aabb {
     let (mut min, mut max) = ([-FAR; 3], [FAR; 3]);
-    let margin = 0.5 * step.speculative_distance;
+    let margin = 0.5 * step.speculative_distance + TILT_MARGIN;
     for axis in 0..3 {
-        if normal[axis] == 1.0 {
-            max[axis] = center[axis] + margin;
+        let (u, v) = (normal[(axis + 1) % 3], normal[(axis + 2) % 3]);
+        if u.abs() > TILT || v.abs() > TILT {
+            continue;
         }
-        if normal[axis] == -1.0 {
+        if normal[axis] > 0.0 {
+            max[axis] = center[axis] + margin;
+        } else {
             min[axis] = center[axis] - margin;
         }
     }
