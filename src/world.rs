@@ -70,7 +70,13 @@ impl World {
     fn auto(scene: Scene, params: Params) -> Result<Self> {
         match tumble_gpu::Gpu::hardware() {
             Ok(Some(gpu)) => Ok(Self::Gpu(Box::new(tumble_gpu::World::with_gpu(gpu, scene, params)?))),
-            Ok(None) | Err(_) => Self::cpu(scene, params),
+            Ok(None) => Self::cpu(scene, params),
+            // There is one, and it does not open: the report says why the CPU runs instead.
+            Err(error) => {
+                let mut world = tumble_cpu::World::new(scene, params)?;
+                world.note(&error.to_string());
+                Ok(Self::Cpu(Box::new(world)))
+            }
         }
     }
 

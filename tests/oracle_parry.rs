@@ -1,7 +1,6 @@
 //! The CPU's broad and narrow phase against parry 0.31: which boxes overlap, and how far apart two shapes are, which way
 //! and where. The GPU is compared with the CPU elsewhere (`parity_collide`, `parity_narrowphase`).
 
-#[allow(dead_code, reason = "made for other tests too")]
 #[path = "common/random.rs"]
 mod random;
 

@@ -68,7 +68,8 @@ fn check_solver(
 fn prepare_builds_the_mirrors_rows() {
     let mut alones = PERMUTATIONS.map(Alone::new);
     let mut floats = Floats::default();
-    for (what, stage) in Stage::all() {
+    for (what, mut stage) in Stage::all() {
+        stage.refresh();
         for (permute, alone) in alones.iter_mut().enumerate() {
             let what = format!("{what}, permuted {permute}");
             stage.put(alone, 8);
@@ -102,8 +103,10 @@ fn prepare_builds_the_mirrors_rows() {
             floats.check(&what, off::APPROACH, both, |p| [p.approach]);
 
             let unused = |head: &ConstraintHead| 4 - head.count as usize;
-            let marked = rows.points.iter().filter(|p| p.pad_a == u32::from_ne_bytes([mark; 4])).count();
+            let mark = u32::from_ne_bytes([mark; 4]);
+            let marked = rows.points.iter().filter(|p| p.pad_a == mark).count();
             assert_eq!(marked, heads.iter().map(unused).sum::<usize>(), "{what}: only points in use are written");
+            assert_eq!(rows.impulses.iter().filter(|i| i.feature == mark).count(), marked, "{what}: impulses too");
         }
     }
     eprintln!("prepare\n{floats}");

@@ -54,7 +54,7 @@ fn measure(scene: &Scene, poses: &Poses, velocities: &Velocities) -> Rest {
 fn run(scene: &Scene, steps: usize, side: Side) -> Rest {
     let params = Params { threads: Some(1), ..Params::default() };
     let mut looks = Vec::new();
-    let late = |step: usize| step + 60 >= steps && step % 6 == 0;
+    let late = |step: usize| step + 60 >= steps && step.is_multiple_of(6);
     match side {
         Side::Rapier => {
             let mut world = RapierWorld::new(scene, &params, 1);

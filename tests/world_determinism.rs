@@ -159,12 +159,13 @@ fn four_at_a_time() {
                 rows.build(start, &cpu.colliders, &bodies, &frame.step, |c| cpu.contact(&frame, c));
                 let moving = Bodies { solver: &mut bodies, states: &frame.states, props: &cpu.props };
                 solve(&mut rows, moving, &frame.step, true);
-                let mut used = vec![Vec::new(); order.len()];
-                rows.for_each_impulse(|c, point, normal, tangent| {
-                    if point < frame.manifolds[order[c] as usize].count as usize {
-                        used[c].push(bits(&Impulse { normal, tangent, feature: 0 }));
-                    }
+                let used = std::sync::Mutex::new(vec![Vec::new(); order.len()]);
+                rows.for_each_constraint(|c, solved| {
+                    let count = frame.manifolds[order[c] as usize].count as usize;
+                    let own = solved[..count].iter().map(|s| [s.0, s.1[0], s.1[1]].map(f32::to_bits)).collect();
+                    used.lock().unwrap()[c] = own;
                 });
+                let used = used.into_inner().unwrap();
                 (bodies, used)
             };
             for (i, (four, one)) in lanes.0.iter().zip(&plain.0).enumerate() {

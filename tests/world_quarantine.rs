@@ -111,17 +111,17 @@ fn impulses_that_overflow() {
     }
 }
 
-/// A force that is finite and throws the body out of all bounds within the step, in a heap and alone.
+/// Forces that are finite and would throw the body out of all bounds within the step, with its neighbours.
 /// Oracle: the run with the body frozen by hand.
 #[test]
 fn forces_that_overflow() {
     for side in SIDES {
         let expected = frozen(side);
-        for force in [Vec3::Y, Vec3::NEG_Y, Vec3::ONE] {
-            let found = run(side, |world, body| world.edit().add_force(body, force * 3e38).unwrap());
-            println!("{side:?} {force} {:?} {}", found.first, found.hashes == expected.hashes);
-            let found = run(side, |world, body| world.edit().add_torque(body, force * 3e38).unwrap());
-            println!("{side:?} {force} {:?} {}", found.first, found.hashes == expected.hashes);
+        for way in [Vec3::Y, Vec3::NEG_Y, Vec3::ONE] {
+            let found = run(side, |world, body| world.edit().add_force(body, way * 3e38).unwrap());
+            assert_eq!(found, expected, "force along {way} on {side:?}");
+            let found = run(side, |world, body| world.edit().add_torque(body, way * 3e38).unwrap());
+            assert_eq!(found, expected, "torque about {way} on {side:?}");
         }
     }
 }
@@ -208,11 +208,10 @@ fn a_very_fast_body() {
         let mut world = side.world(&scene, &Params::default());
         steps(&mut world, 60);
         let (poses, report) = (world.poses().unwrap(), report(&mut world));
-        // 240 sums of 4,167 m: each rounds by half in the last place of at most 1e6 m, 0.03 m; 0.75 m was measured.
+        // 240 sums of 4,167 m: each rounds by half in the last place of at most 1e6 m, 0.03 m; 0.5 m was measured.
         let x = poses[body].translation.x;
         assert!((x - 1e6).abs() < 240.0 * 0.03, "{side:?}: {x}");
         assert_eq!(report.quarantined, 0, "{report}");
-        println!("{side:?} off by {}", x - 1e6);
 
         for way in [Vec3::NEG_Y, Vec3::Y, Vec3::new(1.0, -0.3, 0.2)] {
             let scene = heap();
@@ -230,7 +229,6 @@ fn a_very_fast_body() {
             }
             let report = worlds::report(&mut world);
             assert_eq!(report.lost, 0, "{side:?}: {report}");
-            println!("{side:?} {way} {report}");
         }
     }
 }

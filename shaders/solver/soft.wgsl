@@ -86,10 +86,11 @@ fn push_normal(
         (*point).approach = min((*point).approach, velocity);
     }
     let change = -(*point).normal_mass * mass_scale * (velocity + bias) - impulse_scale * (*impulse).normal;
-    let new_normal = max((*impulse).normal + change, 0.0);
-    let push = new_normal - (*impulse).normal;
-    // The change too: whether max(NaN, 0) is NaN, WGSL leaves open.
-    if is_finite_bits(change) && is_finite_bits(push) {
+    let sum = (*impulse).normal + change;
+    // The sum, and not the push: the larger of NaN and zero may be zero.
+    if is_finite_bits(sum) {
+        let new_normal = max(sum, 0.0);
+        let push = new_normal - (*impulse).normal;
         (*impulse).normal = new_normal;
         (*point).max_impulse = max((*point).max_impulse, new_normal);
         apply(a, b, ra, rb, push * normal);
@@ -143,9 +144,10 @@ fn bounce(
     let rb = (*point).anchor_b;
     let velocity = dot(normal, relative_velocity(a, b, ra, rb));
     let change = -(*point).normal_mass * (velocity + restitution * approach);
-    let new_normal = max((*impulse).normal + change, 0.0);
-    let push = new_normal - (*impulse).normal;
-    if is_finite_bits(change) && is_finite_bits(push) {
+    let sum = (*impulse).normal + change;
+    if is_finite_bits(sum) {
+        let new_normal = max(sum, 0.0);
+        let push = new_normal - (*impulse).normal;
         (*impulse).normal = new_normal;
         apply(a, b, ra, rb, push * normal);
     }

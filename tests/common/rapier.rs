@@ -4,8 +4,8 @@ use rapier3d::prelude as r;
 use tumble_core::{BodyHandle, CombineRule, Params, Pose, Poses, RigidBodyType, Scene, Shape, Velocity};
 
 /// A scene in rapier, with sleep off.
-pub struct RapierWorld {
-    pub world: r::PhysicsWorld,
+pub(crate) struct RapierWorld {
+    world: r::PhysicsWorld,
     bodies: Vec<(BodyHandle, r::RigidBodyHandle)>,
 }
 
@@ -20,7 +20,7 @@ fn rule(rule: CombineRule) -> r::CoefficientCombineRule {
 
 impl RapierWorld {
     /// Same dt, sub-steps and gravity; rapier's own defaults otherwise.
-    pub fn new(scene: &Scene, params: &Params, threads: usize) -> Self {
+    pub(crate) fn new(scene: &Scene, params: &Params, threads: usize) -> Self {
         let mut world = r::PhysicsWorld { gravity: scene.gravity, ..r::PhysicsWorld::default() };
         world.integration_parameters.dt = params.dt;
         world.integration_parameters.num_solver_iterations = params.substeps as usize;
@@ -67,26 +67,12 @@ impl RapierWorld {
         Self { world, bodies }
     }
 
-    pub fn step(&mut self) {
+    pub(crate) fn step(&mut self) {
         self.world.step();
     }
 
-    fn body(&self, handle: BodyHandle) -> &r::RigidBody {
-        let (_, body) = self.bodies.iter().find(|(h, _)| *h == handle).expect("a body of the scene");
-        &self.world.bodies[*body]
-    }
-
-    pub fn pose(&self, handle: BodyHandle) -> Pose {
-        let p = self.body(handle).position();
-        Pose { translation: p.translation, rotation: p.rotation }
-    }
-
-    pub fn velocity(&self, handle: BodyHandle) -> Velocity {
-        Velocity { linear: self.body(handle).linvel(), angular: self.body(handle).angvel() }
-    }
-
     /// All poses, in tumble's form.
-    pub fn poses(&self) -> Poses {
+    pub(crate) fn poses(&self) -> Poses {
         Poses::collect(
             0,
             self.bodies.iter().map(|&(h, b)| {
@@ -97,7 +83,8 @@ impl RapierWorld {
     }
 
     /// All velocities, in tumble's form.
-    pub fn velocities(&self) -> tumble_core::Velocities {
+    #[allow(dead_code, reason = "benches read poses alone")]
+    pub(crate) fn velocities(&self) -> tumble_core::Velocities {
         tumble_core::Velocities::collect(
             0,
             self.bodies.iter().map(|&(h, b)| {

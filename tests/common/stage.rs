@@ -38,7 +38,9 @@ impl Stage {
         control.solved = frame.batches.order.len() as u32;
         let bodies = cpu.bodies(&frame);
         let rows = cpu.rows(&frame, &bodies);
-        Self { cpu, frame, control, bodies, rows }
+        let mut stage = Self { cpu, frame, control, bodies, rows };
+        stage.spoil();
+        stage
     }
 
     pub(crate) fn all() -> impl Iterator<Item = (String, Self)> {
@@ -47,6 +49,21 @@ impl Stage {
         // So deep that overlap is undone at the highest speed.
         let overlap = ("overlap".to_owned(), Self::new(&scenes::overlap_cube().0, 0));
         sizes.chain([hub, overlap])
+    }
+
+    /// Fills the places of points that are not in use, as an earlier step would.
+    fn spoil(&mut self) {
+        for (i, impulse) in self.rows.impulses.iter_mut().enumerate() {
+            if i as u32 % 4 >= self.rows.heads[i / 4].count {
+                *impulse = Impulse { normal: 7.0, tangent: [7.0; 2], feature: 7 };
+            }
+        }
+    }
+
+    /// Every third pair is new: what its slot remembers is another's.
+    pub(crate) fn refresh(&mut self) {
+        self.frame.matched.pairs.iter_mut().step_by(3).for_each(|pair| pair.kind |= pair_kind::FRESH);
+        self.rows = self.cpu.rows(&self.frame, &self.bodies);
     }
 
     /// Everything that the passes read, and `solver_bodies` and rows as they are now.

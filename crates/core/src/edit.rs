@@ -11,6 +11,7 @@ use crate::poses::Pose;
 use crate::scene::Scene;
 use bytemuck::Zeroable;
 use glam::{Quat, Vec3};
+use std::collections::HashMap;
 
 /// Collects edits for the next step and keeps the description of the scene in step with them.
 #[derive(Debug, Clone)]
@@ -18,7 +19,14 @@ pub struct Editor {
     scene: Scene,
     plan: Plan,
     records: Vec<EditRecord>,
+    /// Impulses and forces of the coming step, by body slot.
+    pushes: HashMap<u32, u32>,
+    /// Whether something came that the plan may not have yet.
+    grown: bool,
 }
+
+/// Most impulses and forces on one body in one step: one loop of a shader applies them.
+const MAX_PUSHES: u32 = 49_000;
 
 /// The edits of one step, grouped by what they change.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -33,7 +41,7 @@ impl Editor {
     /// Takes over a scene whose packed form a backend is about to load.
     pub fn new(scene: Scene) -> Result<(Self, PackedScene)> {
         let packed = PackedScene::new(&scene)?;
-        Ok((Self { scene, plan: packed.plan, records: Vec::new() }, packed))
+        Ok((Self { scene, plan: packed.plan, records: Vec::new(), pushes: HashMap::new(), grown: false }, packed))
     }
 
     /// The scene as edited so far. Poses and velocities in it are those at insertion.
@@ -41,7 +49,7 @@ impl Editor {
         &self.scene
     }
 
-    /// What the scene can need by now.
+    /// What the scene could need when edits were last taken.
     pub fn plan(&self) -> Plan {
         self.plan
     }
@@ -64,7 +72,7 @@ impl Editor {
     /// Adds a body with its first collider.
     pub fn insert(&mut self, body: RigidBodyBuilder, collider: ColliderBuilder) -> Result<Inserted> {
         let inserted = self.scene.try_insert(body, collider)?;
-        self.widen();
+        self.grown = true;
         let PackedBody { state, props, colliders } = pack_body(&self.scene, inserted.body)?;
         let mut spawn = self.props_record(edit_op::SPAWN, inserted.body, &props);
         spawn.kind = state.flags;
@@ -85,7 +93,7 @@ impl Editor {
     pub fn attach(&mut self, body: BodyHandle, collider: ColliderBuilder) -> Result<ColliderHandle> {
         let before = pack_body(&self.scene, body)?.props;
         let handle = self.scene.attach(body, collider)?;
-        self.widen();
+        self.grown = true;
         self.restore_props(body, &before);
         let PackedBody { props, colliders, .. } = pack_body(&self.scene, body)?;
         let mut record = self.props_record(edit_op::PROPS, body, &props);
@@ -188,6 +196,11 @@ impl Editor {
 
     /// Hands over the edits since the last call, for the step that begins now.
     pub fn take(&mut self) -> EditBatch {
+        self.pushes.clear();
+        if std::mem::take(&mut self.grown) {
+            let needed = Plan::of(&self.scene);
+            self.plan.widen(&needed);
+        }
         let mut records = std::mem::take(&mut self.records);
         records.sort_by_key(target_key);
         let mut ranges: Vec<EditRange> = Vec::new();
@@ -218,15 +231,14 @@ impl Editor {
         }
     }
 
-    fn widen(&mut self) {
-        let needed = Plan::of(&self.scene);
-        self.plan.widen(&needed);
-    }
-
     fn act(&mut self, op: u32, body: BodyHandle, field: &'static str, a: Vec3, b: Vec3) -> Result<()> {
         self.scene.entry(body)?;
         check_finite(a, || body.to_string(), field)?;
         check_finite(b, || body.to_string(), field)?;
+        let count = self.pushes.entry(body.slot).or_insert(0);
+        *count += 1;
+        const MOST: &str = "up to 49,000 impulses and forces on one body in one step: add them up first";
+        check(*count <= MAX_PUSHES, || body.to_string(), field, *count, MOST)?;
         self.push(op, body, pad(a.to_array()), pad(b.to_array()));
         Ok(())
     }
@@ -243,12 +255,10 @@ impl Editor {
     }
 
     fn props_record(&self, op: u32, body: BodyHandle, props: &BodyProps) -> EditRecord {
-        {
-            let words: [[u32; 4]; 5] = bytemuck::cast(*props);
-            let mut record = EditRecord { op, target: body.slot, ..EditRecord::zeroed() };
-            record.data[..5].copy_from_slice(&words);
-            record
-        }
+        let words: [[u32; 4]; 5] = bytemuck::cast(*props);
+        let mut record = EditRecord { op, target: body.slot, ..EditRecord::zeroed() };
+        record.data[..5].copy_from_slice(&words);
+        record
     }
 
     fn push_collider(&mut self, op: u32, slot: usize, collider: &Collider) {

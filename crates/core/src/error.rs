@@ -3,7 +3,7 @@
 use crate::handle::{BodyHandle, ColliderHandle};
 
 /// The result of everything here that can fail.
-pub type Result<T> = std::result::Result<T, Error>;
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// Every way in which the library refuses or fails.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -29,8 +29,9 @@ pub enum Error {
     StaleCollider(ColliderHandle),
     /// More elements than a buffer holds, and growth is forbidden or impossible.
     #[error(
-        "buffer `{buffer}` needs room for {needed} elements and has room for {capacity}; \
-         raise `Params::capacities`, allow growth, or make the scene smaller (the last good state is still readable)"
+        "buffer `{buffer}` needs room for {needed} elements and has room for {capacity}; {} (the last good state is \
+         still readable)",
+        advice(buffer)
     )]
     Capacity {
         /// The buffer's name.
@@ -103,4 +104,14 @@ pub(crate) fn check(
     allowed: &'static str,
 ) -> Result<()> {
     if ok { Ok(()) } else { Err(Error::Invalid { what: what(), field, value: format!("{value:?}"), allowed }) }
+}
+
+fn advice(buffer: &str) -> &'static str {
+    match buffer {
+        "cell" => "too many colliders lie around one place: spread them out",
+        "last batch" => {
+            "too many contacts on bodies that touch more than 63 others: split those bodies or spread the others out"
+        }
+        _ => "allow growth in `Params::capacities`, raise its `pairs` or `max_array_bytes`, or make the scene smaller",
+    }
 }

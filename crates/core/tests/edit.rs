@@ -109,10 +109,10 @@ fn insert_carries_the_packed_body() {
     let collider = ColliderBuilder::cuboid(0.1, 0.2, 0.3).density(500.0).translation(Vec3::Z).friction(0.9);
     let new = editor.insert(body, collider).unwrap();
     assert_eq!((new.body.slot(), editor.body_slots(), editor.collider_slots()), (4, 5, 5));
-    assert!(editor.plan().has(pair_kind::BALL_CUBOID), "the plan is wider now");
 
     let packed = PackedScene::new(editor.scene()).unwrap();
     let batch = editor.take();
+    assert!(editor.plan().has(pair_kind::BALL_CUBOID), "the plan is wider now");
     assert_grouped(&batch);
     let expected = [(edit_op::SPAWN, 4), (edit_op::POSE, 4), (edit_op::VELOCITY, 4), (edit_op::COLLIDER, 4)];
     assert_eq!(ops(&batch), expected);
@@ -210,4 +210,18 @@ fn refused_edits_leave_nothing() {
     assert_eq!(editor.take(), EditBatch::default());
     assert_eq!((editor.scene().len(), editor.scene().collider_count()), (3, 3));
     assert_eq!(editor.scene().gravity, Vec3::new(0.0, -9.81, 0.0));
+}
+
+/// One loop of a shader applies the pushes on a body, so their number has a bound.
+#[test]
+fn too_many_pushes_on_one_body_are_refused() {
+    let (mut editor, [a, b, ..]) = editor();
+    for _ in 0..49_000 {
+        editor.apply_impulse(a.body, Vec3::X).unwrap();
+    }
+    let error = editor.apply_impulse(a.body, Vec3::X).unwrap_err();
+    assert!(error.to_string().contains("impulse is 49001"), "{error}");
+    editor.apply_impulse(b.body, Vec3::X).unwrap();
+    editor.take();
+    editor.apply_impulse(a.body, Vec3::X).unwrap();
 }

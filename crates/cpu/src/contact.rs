@@ -9,6 +9,9 @@ use tumble_core::layout::{Collider, Impulse, Manifold, NO_SLOT, Pair, UNBATCHED,
 /// Feature of an impulse that belongs to no point.
 pub const NO_FEATURE: u32 = u32::MAX;
 
+/// The impulse of no point.
+pub const NO_IMPULSE: Impulse = Impulse { normal: 0.0, tangent: [0.0; 2], feature: NO_FEATURE };
+
 /// What `match_pairs` decides; nothing of it lasts before `commit`.
 #[derive(Debug, Default)]
 pub struct Matched {
@@ -81,7 +84,7 @@ pub fn commit_pair(manifold: &Manifold, batch: u32, batch_of_slot: &mut u32, imp
     if manifold.count == 0 {
         *batch_of_slot = UNBATCHED;
         for impulse in impulses {
-            *impulse = Impulse { normal: 0.0, tangent: [0.0; 2], feature: NO_FEATURE };
+            *impulse = NO_IMPULSE;
         }
     } else {
         *batch_of_slot = batch;

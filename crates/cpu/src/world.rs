@@ -2,7 +2,8 @@
 
 use crate::batch::{self, Batches};
 use crate::broadphase::grid;
-use crate::contact::{self, Matched, NO_FEATURE};
+use crate::contact::{self, Matched};
+use crate::shared::Shared;
 use crate::solver::{self, Rows, prepare, store};
 use crate::{bounds, edit, motion, narrowphase};
 use bytemuck::Zeroable;
@@ -10,8 +11,8 @@ use rayon::prelude::*;
 use std::time::Instant;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{
-    Aabb, BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Control, FoundManifold, Impulse, Manifold,
-    Pair, PoseRecord, QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, body_flags,
+    Aabb, BodyProps, BodyState, Collider, Control, FoundManifold, Impulse, Manifold, Pair, PoseRecord,
+    QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, body_flags,
 };
 use tumble_core::limits::{self, Room};
 use tumble_core::{Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
@@ -82,17 +83,12 @@ impl World {
     pub fn new(scene: Scene, params: Params) -> Result<Self> {
         params.validate()?;
         let (editor, packed) = Editor::new(scene)?;
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(params.threads.unwrap_or(0)).build().map_err(|e| {
-            Error::Invalid {
-                what: "Params".into(),
-                field: "threads",
-                value: format!("{:?}", params.threads),
-                allowed: if e.to_string().is_empty() {
-                    "a number"
-                } else {
-                    "a number of threads that the system can start"
-                },
-            }
+        let threads = params.threads.unwrap_or(0);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| Error::Invalid {
+            what: format!("Params ({error})"),
+            field: "threads",
+            value: threads.to_string(),
+            allowed: "a number of threads that the system can start",
         })?;
         let adapter = format!("{}, {} threads", std::env::consts::ARCH, pool.current_num_threads());
         let mut kept = Kept {
@@ -109,7 +105,7 @@ impl World {
             rows: Rows::default(),
         };
         let (bodies, colliders) = (kept.states.len() as u32, kept.colliders.len() as u32);
-        kept.reserve_pairs(limits::initial_pairs(&params.capacities, colliders));
+        kept.reserve_pairs(limits::initial_pairs(&params.capacities, colliders))?;
         Ok(Self {
             editor,
             room: Room::first(&params.capacities, bodies, colliders),
@@ -121,6 +117,12 @@ impl World {
             growths: Vec::new(),
             drop_pair: u32::MAX,
         })
+    }
+
+    /// Adds a remark to what reports say of where the world runs.
+    #[doc(hidden)]
+    pub fn note(&mut self, remark: &str) {
+        self.adapter = format!("{} ({remark})", self.adapter);
     }
 
     /// Edits for the next step.
@@ -226,7 +228,7 @@ impl World {
             return Err(Error::Capacity { buffer, needed, capacity: capacity.into() });
         }
         let room = limits::more(buffer, needed, capacity, limits::BYTES_A_PAIR, &self.params.capacities)?;
-        self.kept.reserve_pairs(room);
+        self.kept.reserve_pairs(room)?;
         self.count_growth(buffer);
         Ok(())
     }
@@ -258,26 +260,37 @@ struct Overflow {
 }
 
 impl Kept {
-    fn reserve_pairs(&mut self, capacity: u32) {
-        let old = self.batch_of_slot.len() as u32;
+    fn reserve_pairs(&mut self, capacity: u32) -> Result<()> {
+        let (old, count) = (self.batch_of_slot.len() as u32, capacity as usize);
         // Lowest slots on top of the stack.
-        let mut free: Vec<u32> = (old..capacity).rev().collect();
+        let mut free: Vec<u32> = Vec::new();
+        reserve(&mut free, count, "free_slots")?;
+        reserve(&mut self.batch_of_slot, count, "batch_of_slot")?;
+        reserve(&mut self.found, count, "found_manifolds")?;
+        reserve(&mut self.impulses, 4 * count, "slot_impulses")?;
+        free.extend((old..capacity).rev());
         free.append(&mut self.free);
         self.free = free;
-        self.batch_of_slot.resize(capacity as usize, UNBATCHED);
-        self.found.resize(capacity as usize, FoundManifold::zeroed());
-        let none = Impulse { normal: 0.0, tangent: [0.0; 2], feature: NO_FEATURE };
-        self.impulses.resize(4 * capacity as usize, none);
+        self.batch_of_slot.resize(count, UNBATCHED);
+        self.found.resize(count, FoundManifold::zeroed());
+        self.impulses.resize(4 * count, contact::NO_IMPULSE);
+        Ok(())
     }
 
+    /// Bytes of what is kept, and of the last step's scratch.
     fn bytes(&self) -> u64 {
-        let step = size_of::<SolverBody>() + size_of::<BodyState>();
-        let bodies =
-            self.states.len() * (size_of::<BodyState>() + size_of::<BodyProps>() + size_of::<PoseRecord>() + step);
-        let colliders = self.colliders.len() * (size_of::<Collider>() + size_of::<Aabb>());
-        let rows = size_of::<Manifold>() + size_of::<ConstraintHead>() + 4 * size_of::<ConstraintPoint>();
-        let pair = 2 * size_of::<Pair>() + 8 * size_of::<Impulse>() + 12 + rows;
-        (bodies + colliders + self.batch_of_slot.len() * pair) as u64
+        let body =
+            2 * size_of::<BodyState>() + size_of::<BodyProps>() + size_of::<PoseRecord>() + size_of::<SolverBody>();
+        let collider = size_of::<Collider>() + size_of::<Aabb>();
+        let slot = 8 + 4 * size_of::<Impulse>() + size_of::<FoundManifold>();
+        let pair = 2 * size_of::<Pair>() + size_of::<Manifold>() + 12;
+        let cells = 8 << limits::cell_table_bits(self.colliders.len() as u32);
+        let counted = self.states.len() * body
+            + self.colliders.len() * collider
+            + self.batch_of_slot.len() * slot
+            + self.pairs.len() * pair
+            + cells;
+        counted as u64 + self.rows.bytes()
     }
 
     /// Everything up to the first write to what lives past the step.
@@ -391,22 +404,7 @@ impl Kept {
         solver::solve(&mut self.rows, moving, step, restitution);
         watch.lap("solver");
         contact::commit_free(&mut self.free, &matched);
-        for (i, pair) in matched.pairs.iter().enumerate() {
-            let slot = pair.slot as usize;
-            let impulses = &mut self.impulses[4 * slot..4 * slot + 4];
-            if manifolds[i].recycled == 0 {
-                let body = |collider: u32| states[self.colliders[collider as usize].body as usize].rotation;
-                self.found[slot] =
-                    FoundManifold { rotation_a: body(pair.a), rotation_b: body(pair.b), manifold: manifolds[i] };
-            }
-            contact::commit_pair(&manifolds[i], batches.of_pair[i], &mut self.batch_of_slot[slot], impulses);
-        }
-        let impulses = &mut self.impulses;
-        self.rows.for_each_impulse(|c, point, normal, tangent| {
-            let index = batches.order[c] as usize;
-            let slot = matched.pairs[index].slot as usize;
-            impulses[4 * slot + point] = store::store(&manifolds[index], point, normal, tangent);
-        });
+        self.commit_slots(&states, &matched, &manifolds, &batches);
         let committed: Vec<_> =
             bodies.par_iter().zip(&states).with_min_len(512).map(|(b, s)| motion::commit(b, s)).collect();
         for (slot, (_, bad)) in committed.iter().enumerate() {
@@ -414,8 +412,9 @@ impl Kept {
                 name(&mut control, slot);
             }
         }
-        self.states = committed.into_iter().map(|(state, _)| state).collect();
-        self.poses = self.states.iter().zip(&self.props).map(|(s, p)| PoseRecord::of(s, p)).collect();
+        self.states = committed.into_par_iter().with_min_len(512).map(|(state, _)| state).collect();
+        let posed = self.states.par_iter().zip(&self.props).with_min_len(512);
+        self.poses = posed.map(|(s, p)| PoseRecord::of(s, p)).collect();
         self.pairs = matched.pairs;
         control.frozen_count = self
             .states
@@ -427,6 +426,44 @@ impl Kept {
         self.control = control;
         watch.lap("motion");
     }
+
+    /// What the slots remember: how the contact was found, its batch, its impulses.
+    fn commit_slots(&mut self, states: &[BodyState], matched: &Matched, manifolds: &[Manifold], batches: &Batches) {
+        let rotation = |collider: u32| states[self.colliders[collider as usize].body as usize].rotation;
+        let found = Shared::new(&mut self.found);
+        let batch_of_slot = Shared::new(&mut self.batch_of_slot);
+        let impulses = Shared::new(bytemuck::cast_slice_mut::<Impulse, [Impulse; 4]>(&mut self.impulses));
+        matched.pairs.par_iter().enumerate().with_min_len(1024).for_each(|(i, pair)| {
+            let (slot, manifold) = (pair.slot as usize, manifolds[i]);
+            let (mut batch, mut own) = (UNBATCHED, [contact::NO_IMPULSE; 4]);
+            contact::commit_pair(&manifold, batches.of_pair[i], &mut batch, &mut own);
+            // SAFETY: the pairs of one list have slots of their own (`contact`), and each is visited once.
+            unsafe { batch_of_slot.set(slot, batch) };
+            if manifold.recycled == 0 {
+                let new = FoundManifold { rotation_a: rotation(pair.a), rotation_b: rotation(pair.b), manifold };
+                // SAFETY: as above.
+                unsafe { found.set(slot, new) };
+            }
+            if manifold.count == 0 {
+                // SAFETY: as above.
+                unsafe { impulses.set(slot, own) };
+            }
+        });
+        self.rows.for_each_constraint(|c, solved| {
+            let index = batches.order[c] as usize;
+            let slot = matched.pairs[index].slot as usize;
+            let stored = std::array::from_fn(|k| store::store(&manifolds[index], k, solved[k].0, solved[k].1));
+            // SAFETY: as above; each constraint is one of those pairs.
+            unsafe { impulses.set(slot, stored) };
+        });
+    }
+}
+
+/// Makes room for `count` elements in all, or says that there is none.
+fn reserve<T>(buffer: &mut Vec<T>, count: usize, name: &str) -> Result<()> {
+    let more = count.saturating_sub(buffer.len());
+    let bytes = (count * size_of::<T>()) as u64;
+    buffer.try_reserve_exact(more).map_err(|_| Error::OutOfMemory { buffer: name.into(), bytes })
 }
 
 /// Names a body newly in quarantine; of those that share a place, the highest slot.

@@ -127,6 +127,51 @@ impl Gpu {
         }
     }
 
+    /// Whether the device can run a step at all: the shaders need WebGPU's default limits, which a user's own device may
+    /// have been made without. (How large the arrays may be, [`Gpu::create_buffer`] tells.)
+    ///
+    /// # Errors
+    /// [`Error::Limits`] names the first limit that is too small, or the first alignment that is too large.
+    pub fn check_limits(&self) -> Result<()> {
+        let (have, default) = (self.device.limits(), Limits::default());
+        let needed = [
+            ("max_bind_groups", 1, have.max_bind_groups),
+            ("max_bindings_per_bind_group", 32, have.max_bindings_per_bind_group),
+            (
+                "max_storage_buffers_per_shader_stage",
+                default.max_storage_buffers_per_shader_stage,
+                have.max_storage_buffers_per_shader_stage,
+            ),
+            ("max_uniform_buffers_per_shader_stage", 4, have.max_uniform_buffers_per_shader_stage),
+            (
+                "max_compute_workgroup_storage_size",
+                default.max_compute_workgroup_storage_size,
+                have.max_compute_workgroup_storage_size,
+            ),
+            ("max_compute_invocations_per_workgroup", 256, have.max_compute_invocations_per_workgroup),
+            ("max_compute_workgroup_size_x", 256, have.max_compute_workgroup_size_x),
+            (
+                "max_compute_workgroups_per_dimension",
+                default.max_compute_workgroups_per_dimension,
+                have.max_compute_workgroups_per_dimension,
+            ),
+        ];
+        for (limit, needed, available) in needed {
+            if available < needed {
+                return Err(self.limit(limit, needed.into(), available.into()));
+            }
+        }
+        let uniform = 1024;
+        if have.max_uniform_buffer_binding_size < uniform {
+            return Err(self.limit("max_uniform_buffer_binding_size", uniform, have.max_uniform_buffer_binding_size));
+        }
+        let (limit, step) = ("min_uniform_buffer_offset_alignment", 256);
+        if have.min_uniform_buffer_offset_alignment > step {
+            return Err(self.limit(limit, step.into(), have.min_uniform_buffer_offset_alignment.into()));
+        }
+        Ok(())
+    }
+
     /// A buffer of this size in bytes, zeroed, never empty; the size is rounded up to a multiple of 4.
     ///
     /// # Errors

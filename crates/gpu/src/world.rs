@@ -88,6 +88,7 @@ impl World {
     #[doc(hidden)]
     pub fn with_pipelines(gpu: Gpu, mut pipelines: Pipelines, scene: Scene, params: Params) -> Result<Self> {
         params.validate()?;
+        gpu.check_limits()?;
         let (editor, packed) = Editor::new(scene)?;
         let (bodies, colliders) = (packed.states.len() as u32, packed.colliders.len() as u32);
         let pairs = limits::initial_pairs(&params.capacities, colliders);

@@ -114,19 +114,22 @@ impl Rows {
         self.last = PlainRows::build(last, |c| prepare::prepare_constraint(&contact(c), colliders, bodies, step));
     }
 
-    /// Calls `take(c, point, normal, tangent)` with the impulse of every point, used or not.
-    pub fn for_each_impulse(&self, mut take: impl FnMut(usize, usize, f32, [f32; 2])) {
-        for (group, &(first, count)) in self.groups.iter().zip(&self.members) {
+    /// Calls `take(c, impulses)` for every constraint, with (normal, tangent) of its four points, used or not; from many
+    /// threads at once.
+    pub fn for_each_constraint(&self, take: impl Fn(usize, [(f32, [f32; 2]); 4]) + Sync) {
+        self.groups.par_iter().zip(&self.members).with_min_len(64).for_each(|(group, &(first, count))| {
             for lane in 0..count as usize {
-                for point in 0..4 {
-                    let (normal, tangent) = group.impulse(lane, point);
-                    take(first as usize + lane, point, normal, tangent);
-                }
+                take(first as usize + lane, std::array::from_fn(|point| group.impulse(lane, point)));
             }
+        });
+        for (i, four) in self.last.impulses.chunks_exact(4).enumerate() {
+            take(self.last_first + i, std::array::from_fn(|point| (four[point].normal, four[point].tangent)));
         }
-        for (i, impulse) in self.last.impulses.iter().enumerate() {
-            take(self.last_first + i / 4, i % 4, impulse.normal, impulse.tangent);
-        }
+    }
+
+    /// Bytes that the rows hold.
+    pub(crate) fn bytes(&self) -> u64 {
+        (self.groups.capacity() * (size_of::<ConstraintLanes>() + 8)) as u64
     }
 
     fn sweep(&mut self, bodies: &mut [SolverBody], step: &StepParams, visit: Visit) {

@@ -67,9 +67,11 @@ fn push_normal(
         point.approach = point.approach.min(velocity);
     }
     let change = -point.normal_mass * mass_scale * (velocity + bias) - impulse_scale * impulse.normal;
-    let new = (impulse.normal + change).max(0.0);
-    let push = new - impulse.normal;
-    if finite([push; 3]) {
+    let sum = impulse.normal + change;
+    // The sum, and not the push: the larger of NaN and zero is zero.
+    if finite([sum; 3]) {
+        let new = sum.max(0.0);
+        let push = new - impulse.normal;
         impulse.normal = new;
         point.max_impulse = point.max_impulse.max(new);
         apply(a, b, ra, rb, push * normal);
@@ -120,9 +122,10 @@ fn bounce(
     let (ra, rb) = (vec3(point.anchor_a), vec3(point.anchor_b));
     let velocity = normal.dot(relative_velocity(a, b, ra, rb));
     let change = -point.normal_mass * (velocity + restitution * point.approach);
-    let new = (impulse.normal + change).max(0.0);
-    let push = new - impulse.normal;
-    if finite([push; 3]) {
+    let sum = impulse.normal + change;
+    if finite([sum; 3]) {
+        let new = sum.max(0.0);
+        let push = new - impulse.normal;
         impulse.normal = new;
         apply(a, b, ra, rb, push * normal);
     }

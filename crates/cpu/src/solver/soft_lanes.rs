@@ -60,9 +60,10 @@ fn push_normal(
     };
     let bias = apart.bitselect(gap, bias);
     let change = -p.normal_mass * mass_scale * (velocity + bias) - impulse_scale * p.normal;
-    let new = (p.normal + change).fast_max(f32x4::ZERO);
+    let sum = p.normal + change;
+    let new = sum.fast_max(f32x4::ZERO);
     let push = new - p.normal;
-    let good = push.is_finite();
+    let good = sum.is_finite();
     let push = good.bitselect(push, f32x4::ZERO);
     p.normal = good.bitselect(new, p.normal);
     p.max_impulse = good.bitselect(p.max_impulse.fast_max(new), p.max_impulse);
@@ -93,9 +94,10 @@ fn bounce(restitution: f32x4, normal: V3, p: &mut PointLanes, a: &mut BodyLanes,
         restitution.simd_gt(f32x4::ZERO) & !p.approach.simd_gt(threshold) & p.max_impulse.simd_gt(f32x4::ZERO);
     let velocity = normal.dot(b.velocity_at(p.anchor_b) - a.velocity_at(p.anchor_a));
     let change = -p.normal_mass * (velocity + restitution * p.approach);
-    let new = (p.normal + change).fast_max(f32x4::ZERO);
+    let sum = p.normal + change;
+    let new = sum.fast_max(f32x4::ZERO);
     let push = new - p.normal;
-    let good = bounces & push.is_finite();
+    let good = bounces & sum.is_finite();
     p.normal = good.bitselect(new, p.normal);
     apply(a, b, p.anchor_a, p.anchor_b, (good & push) * normal);
 }
