@@ -1,7 +1,8 @@
 //! Milliseconds a step, and the overlap that they leave, beside rapier in one run: `cargo bench --bench step`.
 //!
 //! Every scene first runs to rest (warm-up), then the engines take turns, so that a noisy machine harms all alike.
-//! `--quick` runs one iteration of everything, as a test.
+//! `--quick` runs one iteration of everything, as a test; `--out DIR` writes `step.csv` and a picture, `step.svg`;
+//! `--profile` adds the CPU side's time by stage.
 
 #[path = "../tests/common/rapier.rs"]
 mod rapier;
@@ -9,7 +10,7 @@ mod rapier;
 use rapier::RapierWorld;
 use std::time::Instant;
 use tumble::prelude::*;
-use tumble_core::{measures, scenes};
+use tumble_core::{Penetration, measures, scenes};
 
 struct Settings {
     warm_up: usize,
@@ -31,18 +32,32 @@ fn timed(times: &mut Vec<f64>, count: usize, mut step: impl FnMut()) {
     }
 }
 
-fn row(engine: &str, times: Vec<f64>, base: f64, scene: &Scene, poses: &tumble_core::Poses) {
-    let overlap = measures::penetration(scene, poses);
-    let ms = median(times);
-    println!(
-        "  {engine:<14} {ms:9.3} ms/step {:7.2} x rapier   overlap max {:8.3} mm mean {:7.4} mm",
-        ms / base,
-        overlap.max_m * 1e3,
-        overlap.mean_m * 1e3
-    );
+/// One engine on one scene.
+struct Row {
+    scene: String,
+    engine: &'static str,
+    /// Median, ms a step.
+    ms: f64,
+    /// Over rapier's in the same run.
+    ratio: f64,
+    overlap: Penetration,
 }
 
-fn compare(name: &str, scene: &Scene, settings: &Settings, gpu: bool) {
+impl Row {
+    fn new(name: &str, engine: &'static str, ms: f64, base: f64, scene: &Scene, poses: &Poses) -> Self {
+        let overlap = measures::penetration(scene, poses);
+        let row = Self { scene: name.into(), engine, ms, ratio: ms / base, overlap };
+        println!(
+            "  {engine:<14} {ms:9.3} ms/step {:7.2} x rapier   overlap max {:8.3} mm mean {:7.4} mm",
+            row.ratio,
+            overlap.max_m * 1e3,
+            overlap.mean_m * 1e3
+        );
+        row
+    }
+}
+
+fn compare(name: &str, scene: &Scene, settings: &Settings, gpu: bool) -> Vec<Row> {
     let params = Params { threads: Some(settings.threads), ..Params::default() };
     let mut theirs = RapierWorld::new(scene, &params, settings.threads);
     let mut ours = tumble::cpu::World::new(scene.clone(), params).expect("the scene is valid");
@@ -67,12 +82,55 @@ fn compare(name: &str, scene: &Scene, settings: &Settings, gpu: bool) {
     }
     let report = ours.sync().expect("report");
     println!("{name}: {} bodies, {} contacts, {} batches", report.bodies, report.contacts, report.batches);
-    let base = median(t.clone());
-    row("rapier 0.36", t, base, scene, &theirs.poses());
-    row("tumble cpu", o, base, scene, &ours.poses().expect("poses"));
+    let base = median(t);
+    let mut rows = vec![Row::new(name, "rapier 0.36", base, base, scene, &theirs.poses())];
+    rows.push(Row::new(name, "tumble cpu", median(o), base, scene, &ours.poses().expect("poses")));
     if let Some(world) = &mut ours_gpu {
-        row("tumble gpu", g, base, scene, &world.poses().expect("poses"));
+        let adapter = world.sync().expect("report").adapter;
+        println!("  on {adapter}");
+        rows.push(Row::new(name, "tumble gpu", median(g), base, scene, &world.poses().expect("poses")));
     }
+    rows
+}
+
+fn csv(rows: &[Row]) -> String {
+    let mut text = String::from("scene,engine,ms_per_step,ratio_to_rapier,overlap_max_mm,overlap_mean_mm\n");
+    for r in rows {
+        let (max, mean) = (r.overlap.max_m * 1e3, r.overlap.mean_m * 1e3);
+        text += &format!("{},{},{:.4},{:.4},{max:.4},{mean:.4}\n", r.scene, r.engine, r.ms, r.ratio);
+    }
+    text
+}
+
+/// Bars of ms a step, a row each.
+fn svg(rows: &[Row]) -> String {
+    let most = rows.iter().map(|r| r.ms).fold(0.0, f64::max);
+    let height = 22 * rows.len() + 40;
+    let mut text = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"760\" height=\"{height}\" font-family=\"sans-serif\" \
+         font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n\
+         <text x=\"10\" y=\"20\" font-weight=\"bold\">Milliseconds a step, and mean overlap left</text>\n"
+    );
+    for (i, r) in rows.iter().enumerate() {
+        let (y, width) = (36 + 22 * i, 360.0 * r.ms / most);
+        let color = match r.engine {
+            "tumble cpu" => "#2b7bba",
+            "tumble gpu" => "#7bbf6a",
+            _ => "#b0b0b0",
+        };
+        text += &format!(
+            "<text x=\"10\" y=\"{}\">{}, {}</text>\n<rect x=\"210\" y=\"{y}\" width=\"{width:.1}\" height=\"16\" \
+             fill=\"{color}\"/>\n<text x=\"{:.1}\" y=\"{}\">{:.2} ms, {:.2} mm</text>\n",
+            y + 13,
+            r.scene,
+            r.engine,
+            216.0 + width,
+            y + 13,
+            r.ms,
+            r.overlap.mean_m * 1e3
+        );
+    }
+    text + "</svg>\n"
 }
 
 fn main() {
@@ -88,9 +146,15 @@ fn main() {
     println!("{threads} threads, dt 1/60 s, 4 sub-steps, {} warm-up steps", settings.warm_up);
     let gpu = !has("--no-gpu");
     let (base, count) = if quick { (10, 64) } else { (100, 4096) };
-    compare("pyramid", &scenes::pyramid(base), &settings, gpu);
-    compare("pile", &scenes::pile(count), &settings, gpu);
-    compare("balls", &scenes::balls(count), &settings, gpu);
+    let mut rows = compare("pyramid", &scenes::pyramid(base), &settings, gpu);
+    rows.extend(compare("pile", &scenes::pile(count), &settings, gpu));
+    rows.extend(compare("balls", &scenes::balls(count), &settings, gpu));
+    if let Some(at) = arguments.iter().position(|a| a == "--out") {
+        let folder = arguments.get(at + 1).expect("--out wants a folder");
+        std::fs::create_dir_all(folder).expect("the folder can be made");
+        std::fs::write(format!("{folder}/step.csv"), csv(&rows)).expect("step.csv can be written");
+        std::fs::write(format!("{folder}/step.svg"), svg(&rows)).expect("step.svg can be written");
+    }
     if has("--profile") {
         let params = Params { threads: Some(threads), profile: true, ..Params::default() };
         for (name, scene) in [("pyramid", scenes::pyramid(base)), ("pile", scenes::pile(count))] {

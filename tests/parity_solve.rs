@@ -243,34 +243,33 @@ fn a_bad_body_harms_no_other() {
     let bad = (5..305).max_by_key(most).unwrap();
     let touching = |h: &ConstraintHead| h.body_a == bad || h.body_b == bad;
     assert!(stage.rows.heads.iter().filter(|h| touching(h)).count() > 3);
-    for visit in [VISITS[1], VISITS[2]] {
-        let alone = &mut Alone::new(0);
-        stage.put(alone, 8);
-        let mut bodies = stage.bodies.clone();
-        bodies[bad as usize].linear_velocity = [f32::NAN; 3];
-        alone.put("solver_bodies", &bodies);
-        alone.run(|chain| stage.sweep(chain, visit, 8));
-        let with_nan: Vec<SolverBody> = alone.take("solver_bodies");
-        // The same without its contacts.
-        let mut heads = stage.rows.heads.clone();
-        let mut points = stage.rows.points.clone();
-        for (c, head) in heads.iter_mut().enumerate().filter(|(_, h)| touching(h)) {
-            head.friction = 0.0;
-            points[4 * c..4 * c + 4].iter_mut().for_each(|p| (p.normal_mass, p.tangent_mass) = (0.0, 0.0));
-            (head.impulse_scale, head.mass_scale) = (0.0, 0.0);
-        }
-        alone.put("solver_bodies", &stage.bodies);
-        alone.put("heads", &heads);
-        alone.put("points", &points);
-        let mut impulses = stage.rows.impulses.clone();
-        for (c, _) in heads.iter().enumerate().filter(|(_, h)| touching(h)) {
-            impulses[4 * c..4 * c + 4].iter_mut().for_each(|i| (i.normal, i.tangent) = (0.0, [0.0; 2]));
-        }
-        alone.put("impulses", &impulses);
-        alone.run(|chain| stage.sweep(chain, visit, 8));
-        let without: Vec<SolverBody> = alone.take("solver_bodies");
-        for (i, (with, without)) in with_nan.iter().zip(&without).enumerate().filter(|(i, _)| *i != bad as usize) {
-            assert_eq!(with, without, "{visit:?}: body {i}");
+    // The same with contacts that push nothing where the bad body is.
+    let mut mute = stage.rows.clone();
+    for (c, head) in mute.heads.iter_mut().enumerate().filter(|(_, head)| touching(head)) {
+        (head.friction, head.mass_scale, head.impulse_scale) = (0.0, 0.0, 0.0);
+        mute.points[4 * c..][..4].iter_mut().for_each(|p| (p.normal_mass, p.tangent_mass) = (0.0, 0.0));
+        mute.impulses[4 * c..][..4].iter_mut().for_each(|i| (i.normal, i.tangent) = (0.0, [0.0; 2]));
+    }
+    let mut ill = stage.bodies.clone();
+    ill[bad as usize].linear_velocity = [f32::NAN; 3];
+    let alone = &mut Alone::new(0);
+    stage.put(alone, 8);
+    for visit in [VISITS[1], VISITS[2], VISITS[3]] {
+        let mut sweep = |bodies: &[SolverBody], rows: &PlainRows| {
+            alone.put("solver_bodies", bodies);
+            alone.put("heads", &rows.heads);
+            alone.put("points", &rows.points);
+            alone.put("impulses", &rows.impulses);
+            alone.run(|chain| stage.sweep(chain, visit, 8));
+            let mut bodies = bodies.to_vec();
+            rows.clone().sweep(&mut bodies, &stage.frame.step, visit.0);
+            [bodies, alone.take("solver_bodies")]
+        };
+        let (with, without) = (sweep(&ill, &stage.rows), sweep(&stage.bodies, &mute));
+        for (side, (with, without)) in ["CPU", "GPU"].iter().zip(with.iter().zip(&without)) {
+            for (i, (with, without)) in with.iter().zip(without).enumerate().filter(|(i, _)| *i != bad as usize) {
+                assert_eq!(with, without, "{side}, {visit:?}: body {i}");
+            }
         }
     }
 }

@@ -29,7 +29,8 @@ pub fn large_limit(colliders: u32) -> u32 {
 
 /// Room in the pair list at first.
 pub fn initial_pairs(capacities: &Capacities, colliders: u32) -> u32 {
-    capacities.pairs.unwrap_or_else(|| colliders.saturating_mul(8).max(1024))
+    let most = capacities.max_array_bytes / BYTES_A_PAIR;
+    capacities.pairs.unwrap_or_else(|| u64::from(colliders.saturating_mul(8).max(1024)).min(most).max(1) as u32)
 }
 
 /// Room for what edits bring: bodies, colliders and the edits themselves, in elements. The same on both sides.

@@ -2,7 +2,7 @@
 
 use crate::error::{Result, check};
 use crate::layout::StepParams;
-use crate::limits::{BATCH_ROUNDS, LAST_LIMIT};
+use crate::limits::{BATCH_ROUNDS, BYTES_A_PAIR, LAST_LIMIT};
 use glam::Vec3;
 
 /// Which broad phase finds the pairs.
@@ -136,6 +136,8 @@ impl Params {
             let capacity = capacity.unwrap_or(1);
             check((1..=1 << 26).contains(&capacity), what, field, capacity, "1 to 67,108,864")?;
         }
+        let fits = pairs.is_none_or(|pairs| u64::from(pairs) * BYTES_A_PAIR <= self.capacities.max_array_bytes);
+        check(fits, what, "capacities.pairs", pairs, "no more than capacities.max_array_bytes / 192")?;
         Ok(())
     }
 

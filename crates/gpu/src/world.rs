@@ -220,10 +220,20 @@ impl World {
     }
 
     /// The newest poses that have arrived, without waiting; `None` before the first have. Each call asks for new ones.
+    /// Those that arrived before the device was lost stay.
     ///
     /// # Errors
     /// As for [`World::step`].
     pub fn try_poses(&mut self) -> Result<Option<Poses>> {
+        match self.fetch_poses() {
+            Err(Error::DeviceLost { .. }) if self.newest_poses.is_some() => {}
+            done => done?,
+        }
+        Ok(self.newest_poses.clone())
+    }
+
+    /// Takes what poses have arrived and asks for new ones.
+    fn fetch_poses(&mut self) -> Result<()> {
         if let Some(bytes) = self.pose_copies.try_take(&self.gpu)? {
             let control = self.step_copies.wait_take(&self.gpu)?.unwrap_or_default();
             self.newest_poses = Some(self.poses_of(read_control(&control).step, &bytes));
@@ -237,7 +247,7 @@ impl World {
             self.pose_copies.submitted(&index);
             self.step_copies.submitted(&index);
         }
-        Ok(self.newest_poses.clone())
+        Ok(())
     }
 
     /// Waits for all submitted steps; the velocity of every body, in one download.
