@@ -36,7 +36,6 @@ const CONTROL_LAST_COUNT: u32 = 17u;
 const CONTROL_LARGE_COUNT: u32 = 18u;
 const CONTROL_MAX_DEGREE: u32 = 19u;
 const CONTROL_SOLVED: u32 = 20u;
-const CONTROL_DROPPED: u32 = 21u;
 const CONTROL_CELL_CLASS: u32 = 22u;
 const CONTROL_CELL_BITS: u32 = 23u;
 const CONTROL_CENTER_MIN: u32 = 24u;
@@ -67,7 +66,7 @@ struct Control {
     large_count: u32,
     max_degree: u32,
     solved: u32,
-    dropped: u32,
+    pad_c: u32,
     cell_class: u32,
     cell_bits: u32,
     center_min: vec3<u32>,

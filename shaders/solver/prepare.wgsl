@@ -194,15 +194,22 @@ fn carry(
         return;
     }
     let index = batch_order[c];
-    let slot = next_pairs[index].slot;
+    let first = 4u * next_pairs[index].slot;
     let fresh = (next_pairs[index].kind & PAIR_FRESH) != 0u;
+    let stored = vec4<u32>(
+        slot_impulses[first].feature,
+        slot_impulses[first + 1u].feature,
+        slot_impulses[first + 2u].feature,
+        slot_impulses[first + 3u].feature,
+    );
     for (var i = 0u; i < min(manifolds[index].count, 4u); i++) {
         var impulse: Impulse;
         impulse.feature = manifolds[index].features[i];
-        for (var s = 0u; s < 4u && !fresh; s++) {
-            if slot_impulses[4u * slot + s].feature == impulse.feature {
-                impulse = slot_impulses[4u * slot + s];
-            }
+        let same = stored == vec4<u32>(impulse.feature);
+        if !fresh && any(same) {
+            // The last that is the same, though no two should be.
+            let k = select(select(select(0u, 1u, same.y), 2u, same.z), 3u, same.w);
+            impulse = slot_impulses[first + k];
         }
         impulses[4u * c + i] = impulse;
     }

@@ -46,8 +46,6 @@ pub struct StepReport {
     pub last_batch: u32,
     /// Found minus processed, over pairs and constraints: zero, or something was lost.
     pub lost: u64,
-    /// Impulses dropped because they were not finite.
-    pub dropped: u32,
     /// Bodies in quarantine, all told.
     pub quarantined: u32,
     /// Slots of bodies newly quarantined in this step, the first few.
@@ -74,7 +72,6 @@ impl StepReport {
             batch_rounds: control.rounds,
             last_batch: control.last_count,
             lost,
-            dropped: control.dropped,
             quarantined: control.frozen_count,
             newly_quarantined: control.quarantined[..QUARANTINE_NAMES]
                 .iter()

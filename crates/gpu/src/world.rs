@@ -7,7 +7,7 @@ use crate::{BindCache, Buffers, Gpu, Pipelines, Recorder, Timer};
 use bytemuck::Zeroable;
 use std::collections::VecDeque;
 use tumble_core::edit::EditBatch;
-use tumble_core::layout::{BodyState, Control, PoseRecord, StepParams, overflow};
+use tumble_core::layout::{BodyState, Control, LAST_BATCH, PoseRecord, StepParams, overflow};
 use tumble_core::limits::{self, Room};
 use tumble_core::{Editor, Error, Params, Plan, Poses, Result, Scene, StageTime, StepReport, Velocities};
 
@@ -15,6 +15,8 @@ use tumble_core::{Editor, Error, Params, Plan, Poses, Result, Scene, StageTime, 
 const IN_FLIGHT: usize = 3;
 /// Batches with a dispatch of their own as long as no report has told how many there are.
 const WIDE_BATCHES: u32 = 24;
+/// Constraints from which on a batch is worth a dispatch; those behind the last such batch share a workgroup.
+const WIDE: u32 = 256;
 
 /// A simulation on a GPU.
 ///
@@ -44,7 +46,7 @@ pub struct World {
     waiting: VecDeque<Record>,
     submitted: u32,
     last: Control,
-    /// Batches that the step of this number had, for the last few.
+    /// Batches that were worth a dispatch in the step of this number, for the last few.
     batches: VecDeque<(u32, u32)>,
     stage_times: Vec<StageTime>,
     growths: Vec<(&'static str, u32)>,
@@ -323,7 +325,7 @@ impl World {
                 continue;
             }
             if let Some(record) = self.flying.pop_front() {
-                self.batches.push_back((record.step.step, status.batch_count));
+                self.batches.push_back((record.step.step, wide_batches(&status)));
                 if self.batches.len() > 2 * IN_FLIGHT {
                     self.batches.pop_front();
                 }
@@ -426,6 +428,13 @@ impl World {
             None => self.growths.push((buffer, 1)),
         }
     }
+}
+
+/// How many of the first batches have a dispatch of their own: up to the last that is worth one.
+fn wide_batches(status: &Control) -> u32 {
+    let sizes = status.batch_start.windows(2).map(|pair| pair[1].saturating_sub(pair[0]));
+    let large = sizes.take(LAST_BATCH as usize).enumerate().filter(|(_, size)| *size >= WIDE);
+    large.last().map_or(0, |(batch, _)| batch as u32 + 1)
 }
 
 fn pose_bytes(sizes: &Sizes) -> u64 {

@@ -72,14 +72,14 @@ pub struct Control {
     pub max_degree: u32,
     /// Constraints that the solver visited.
     pub solved: u32,
-    /// Impulses dropped because they were not finite.
-    pub dropped: u32,
+    /// Unused.
+    pub pad_c: u32,
     /// Size class of the grid's cells.
     pub cell_class: u32,
     /// Bits of the cell index along x | y << 8 | z << 16.
     pub cell_bits: u32,
 
-    /// Lowest centre of a collider, as order-preserving integers; then its float bits once the grid is chosen.
+    /// Lowest centre of a collider, as order-preserving integers.
     pub center_min: [u32; 3],
     /// 1 / cell edge, 1/m, as float bits.
     pub inverse_cell: u32,
