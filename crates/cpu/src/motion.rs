@@ -105,12 +105,14 @@ fn cayley(w: Vec3, h: f32) -> Quat {
     Quat::from_xyzw(half.x, half.y, half.z, 1.0).normalize()
 }
 
-/// The rotation by |w| h about w.
+/// The rotation by |w| h about w, where that is no more than one radian. Sine and cosine by their series, good to the
+/// last bit or two there, and the same on every machine.
 fn half_turn(w: Vec3, h: f32) -> Quat {
     let half = 0.5 * h * w;
-    let angle = half.length();
-    let ratio = if angle > 1e-3 { angle.sin() / angle } else { 1.0 - angle * angle / 6.0 };
-    Quat::from_xyzw(half.x * ratio, half.y * ratio, half.z * ratio, angle.cos())
+    let s = half.dot(half);
+    let ratio = 1.0 - s * (1.0 / 6.0 - s * (1.0 / 120.0 - s * (1.0 / 5040.0)));
+    let cosine = 1.0 - s * (0.5 - s * (1.0 / 24.0 - s * (1.0 / 720.0 - s * (1.0 / 40320.0))));
+    Quat::from_xyzw(half.x * ratio, half.y * ratio, half.z * ratio, cosine)
 }
 
 /// The state after the step. A result that is not finite is thrown away: the body keeps its pose and is put in
