@@ -48,9 +48,7 @@ const SPREADS: [Spread; 8] = [
 fn scene_of(spread: Spread, bodies: usize, large: bool, seed: u64) -> Scene {
     let mut random = Random::new(seed);
     let mut scene = Scene::new();
-    if spread != Spread::Fast {
-        scene.gravity = Vec3::ZERO;
-    }
+    scene.gravity = if spread == Spread::Fast { random.vector(30.0) } else { Vec3::ZERO };
     let middle = if spread == Spread::FarAway { Vec3::new(8000.0, -3.0, 50.0) } else { Vec3::ZERO };
     let side = 1.3 * (bodies as f32).cbrt();
     if large {

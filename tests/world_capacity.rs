@@ -70,6 +70,16 @@ impl Play {
             edit.apply_impulse(body, Vec3::new(20.0 * i as f32, 90.0, -30.0)).unwrap();
             edit.add_force_at_point(body, Vec3::new(0.0, 400.0, 100.0), Vec3::new(0.1, 1.0, 0.2)).unwrap();
         }
+        if step == self.rush + 1 || step == self.rush + 2 {
+            // In flight behind the rush: if that stops, nothing of this may have been done when it is run again.
+            for i in 0..6 {
+                let brick = ColliderBuilder::cuboid(0.2, 0.3, 0.1).density(5000.0).translation(Vec3::X * 0.5);
+                edit.attach(movable(9 * i), brick).unwrap();
+            }
+            edit.remove(movable(11)).unwrap();
+            let body = RigidBodyBuilder::dynamic().translation(Vec3::new(0.0, 14.0, 0.0));
+            edit.insert(body, ColliderBuilder::cuboid(0.4, 0.4, 0.4)).unwrap();
+        }
         if step != self.rush {
             return;
         }

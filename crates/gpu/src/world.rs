@@ -432,9 +432,11 @@ impl World {
 
 /// How many of the first batches have a dispatch of their own: up to the last that is worth one.
 fn wide_batches(status: &Control) -> u32 {
-    let sizes = status.batch_start.windows(2).map(|pair| pair[1].saturating_sub(pair[0]));
-    let large = sizes.take(LAST_BATCH as usize).enumerate().filter(|(_, size)| *size >= WIDE);
-    large.last().map_or(0, |(batch, _)| batch as u32 + 1)
+    let worth = |batch: &u32| {
+        let first = *batch as usize;
+        status.batch_start[first + 1].saturating_sub(status.batch_start[first]) >= WIDE
+    };
+    (0..LAST_BATCH).rev().find(worth).map_or(0, |batch| batch + 1)
 }
 
 fn pose_bytes(sizes: &Sizes) -> u64 {
