@@ -1,5 +1,5 @@
-//! The CPU's broad and narrow phase against parry 0.31: which boxes overlap, and how far apart two shapes are, which way
-//! and where. The GPU is compared with the CPU elsewhere (`parity_collide`, `parity_narrowphase`).
+//! The CPU's broad and narrow phase against parry 0.31: which boxes overlap, and how far apart two shapes are, which
+//! way and where. The GPU is compared with the CPU elsewhere (`parity_collide`, `parity_narrowphase`).
 
 #[path = "common/random.rs"]
 mod random;
@@ -527,15 +527,15 @@ fn nearly_deepest(separation: f64) -> f64 {
     SEPARATION + 0.25 * f64::from(DISTANCE) + 1e-3 * separation.abs()
 }
 
-/// By how much the axis that was taken may show a smaller gap than the best one: faces go before edges by a share of the
-/// speculative distance that is below a half (`cuboid_cuboid::collide`).
+/// By how much the axis that was taken may show a smaller gap than the best one: faces go before edges by a share of
+/// the speculative distance that is below a half (`cuboid_cuboid::collide`).
 const PREFERENCE: f64 = 0.5 * DISTANCE as f64;
 
 /// An axis that shows all of the distance but so much, m, is taken for the direction of the nearest points: parry's own
 /// error is some 1e-6.
 const TIE: f64 = 1e-5;
-/// What is nearest may then lie beyond the face's rim, by up to sqrt(2 TIE distance), some 4 mm, and the clipped face is
-/// farther off there: 0.63 mm were measured.
+/// What is nearest may then lie beyond the face's rim, by up to sqrt(2 TIE distance), some 4 mm, and the clipped face
+/// is farther off there: 0.63 mm were measured.
 const GAP: f64 = 1.5e-3;
 
 impl Two {
@@ -603,15 +603,16 @@ fn cuboid_and_cuboid() {
             };
             apart += 1;
             worst.see("distance", (found.separation - distance).abs(), GAP);
-            // The normal shows the distance; cos(angle) to the way between the nearest points is no less than the ratio.
+            // The normal shows the distance: its cosine with the way between the nearest points is no less than the
+            // ratio.
             let shown = two.gap_along(normal);
             worst.see("gap along the normal", (shown - distance).abs(), SEPARATION + PREFERENCE + TIE);
             let off = found.on[1].distance(0.5 * (on_a + on_b).as_dvec3());
             far_off += usize::from(off > 1e-3 || normal.distance(way) > 1e-3);
         }
     }
-    // Where an edge is nearly parallel to what it is nearest to, a rounding decides which end that is, and an axis that is
-    // as good may be another one.
+    // Where an edge is nearly parallel to what it is nearest to, a rounding decides which end that is, and an axis that
+    // is as good may be another one.
     println!("{overlapping} overlap, {apart} apart, {corners} by a corner, {far_off} of uncertain place or normal");
     assert!(far_off < apart / 50, "{far_off} of {apart} contacts are not where parry's nearest points are");
 }

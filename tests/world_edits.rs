@@ -192,8 +192,8 @@ fn inertia(mass: &MassProperties, rotation: DQuat) -> DMat3 {
     frame * DMat3::from_diagonal(mass.principal_inertia.as_dvec3()) * frame.transpose()
 }
 
-/// A further collider leaves the body's own frame and its motion as they are: every point of it goes on as it went. It is
-/// heavier, so its momentum is that of the new mass with the old motion. Oracle: analysis.
+/// A further collider leaves the body's own frame and its motion as they are: every point of it goes on as it went. It
+/// is heavier, so its momentum is that of the new mass with the old motion. Oracle: analysis.
 #[test]
 fn attach_keeps_the_motion() {
     for side in SIDES {
@@ -249,8 +249,8 @@ fn pushes_and_attach_in_one_step() {
     }
 }
 
-/// A box rests on the floor; in one step it goes and a heavier one comes to the same place in the same slots. Nothing of
-/// the old contact is left: it is as in a world that begins with the new box. Oracle: that world.
+/// A box rests on the floor; in one step it goes and a heavier one comes to the same place in the same slots. Nothing
+/// of the old contact is left: it is as in a world that begins with the new box. Oracle: that world.
 #[test]
 fn a_slot_reused_in_one_step() {
     let heavy = || {
@@ -283,8 +283,8 @@ fn a_slot_reused_in_one_step() {
     }
 }
 
-/// The same in a heap: one body goes and another comes far away. Where it was, the others close in; where it is, it falls
-/// freely. Oracle: analysis.
+/// The same in a heap: one body goes and another comes far away. Where it was, the others close in; where it is, it
+/// falls freely. Oracle: analysis.
 #[test]
 fn a_removed_body_is_gone() {
     for side in SIDES {
@@ -353,8 +353,8 @@ fn stale_handles() {
     }
 }
 
-/// Shapes and bounces that the scene did not have: the passes for them are made when they come, and the bits are those of
-/// a world that had them from the start, far away. Oracle: that world.
+/// Shapes and bounces that the scene did not have: the passes for them are made when they come, and the bits are those
+/// of a world that had them from the start, far away. Oracle: that world.
 #[test]
 fn the_plan_widens() {
     for side in SIDES {

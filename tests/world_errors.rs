@@ -1,5 +1,5 @@
-//! What a world refuses, and how: an error that names the field, limit or buffer, the value and what is allowed; never a
-//! panic, and a world that was good stays good. Oracle: analysis, but where a test names another.
+//! What a world refuses, and how: an error that names the field, limit or buffer, the value and what is allowed; never
+//! a panic, and a world that was good stays good. Oracle: analysis, but where a test names another.
 
 mod common;
 #[path = "common/worlds.rs"]
@@ -367,4 +367,12 @@ fn the_backend_is_named() {
     let text = child("the_backend_is_named", &[("WGPU_ADAPTER_NAME", "no such adapter")]);
     let told = text.lines().find(|line| line.starts_with("asked: ")).expect("what was said");
     assert!(told.contains("WGPU_ADAPTER_NAME=no such adapter") && told.contains(&info.name), "{told}");
+}
+
+/// wgpu's default limits, which every adapter has, carry 100,000 boxes. Oracle: the limits themselves (the backend that
+/// runs nothing checks them).
+#[test]
+fn default_limits_carry_a_hundred_thousand_boxes() {
+    let mut world = tumble_gpu::World::with_gpu(Gpu::noop(), scenes::pile(100_000), Params::default()).unwrap();
+    world.step().unwrap();
 }

@@ -50,7 +50,8 @@ fn run(side: Side, mut bad: impl FnMut(&mut World, BodyHandle)) -> Run {
     Run { hashes, poses: world.poses().unwrap(), first, last: report(&mut world) }
 }
 
-/// The run in which the body is frozen by hand; the body is in contact with others. Checked: its pose is that of before.
+/// The run in which the body is frozen by hand; the body is in contact with others. Checked: its pose is that of
+/// before.
 fn frozen(side: Side) -> Run {
     let scene = heap();
     let body = victim(&scene);

@@ -79,8 +79,9 @@ impl Room {
 /// # Errors
 /// [`Error::Capacity`] when it may not grow so far.
 pub fn more(buffer: &'static str, needed: u64, capacity: u32, bytes: u64, capacities: &Capacities) -> Result<u32> {
-    let room = grown(needed);
-    if !capacities.grow || room * bytes > capacities.max_array_bytes || room > u64::from(u32::MAX >> 6) {
+    let most = (capacities.max_array_bytes / bytes).min(u64::from(u32::MAX >> 6));
+    let room = grown(needed).min(most);
+    if !capacities.grow || room < needed {
         return Err(Error::Capacity { buffer, needed, capacity: capacity.into() });
     }
     Ok(room as u32)

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{BodyState, Control, LAST_BATCH, PoseRecord, StepParams, overflow};
 use tumble_core::limits::{self, Room};
-use tumble_core::{Editor, Error, Params, Plan, Poses, Result, Scene, StageTime, StepReport, Velocities};
+use tumble_core::{Capacities, Editor, Error, Params, Plan, Poses, Result, Scene, StageTime, StepReport, Velocities};
 
 /// Steps in flight before `step` waits.
 const IN_FLIGHT: usize = 3;
@@ -93,7 +93,7 @@ impl World {
         gpu.check_limits()?;
         let (editor, packed) = Editor::new(scene)?;
         let (bodies, colliders) = (packed.states.len() as u32, packed.colliders.len() as u32);
-        let pairs = limits::initial_pairs(&params.capacities, colliders);
+        let pairs = limits::initial_pairs(&within(&gpu, &params), colliders);
         let room = Room::first(&params.capacities, bodies, colliders);
         let sizes = Sizes { bodies: room.bodies, colliders: room.colliders, pairs };
         let buffers = store::create(&gpu, &packed, &sizes, room.edits)?;
@@ -373,7 +373,7 @@ impl World {
         if buffer != "pairs" {
             return Err(error);
         }
-        let room = limits::more(buffer, needed, capacity, limits::BYTES_A_PAIR, &self.params.capacities)?;
+        let room = limits::more(buffer, needed, capacity, limits::BYTES_A_PAIR, &within(&self.gpu, &self.params))?;
         let old = self.sizes.pairs;
         let control = self.buffers.buffer("control")?;
         let free_count: u32 = bytemuck::pod_read_unaligned(&read_now(&self.gpu, control, 20, 4)?);
@@ -397,7 +397,7 @@ impl World {
     fn make_room(&mut self, needed: Room) -> Result<()> {
         let Sizes { bodies, colliders, .. } = self.sizes;
         let room = Room { bodies, colliders, edits: self.edit_room };
-        let (room, grown) = room.grown(&needed, &self.params.capacities)?;
+        let (room, grown) = room.grown(&needed, &within(&self.gpu, &self.params))?;
         if room.edits > self.edit_room {
             for buffer in ["edit_records", "edit_ranges"] {
                 self.buffers.grow(&self.gpu, buffer, room.edits.into(), false)?;
@@ -437,6 +437,13 @@ fn wide_batches(status: &Control) -> u32 {
         status.batch_start[first + 1].saturating_sub(status.batch_start[first]) >= WIDE
     };
     (0..LAST_BATCH).rev().find(worth).map_or(0, |batch| batch + 1)
+}
+
+/// The capacities that the user allows and the device has.
+fn within(gpu: &Gpu, params: &Params) -> Capacities {
+    let limits = gpu.device.limits();
+    let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    Capacities { max_array_bytes: params.capacities.max_array_bytes.min(most), ..params.capacities }
 }
 
 fn pose_bytes(sizes: &Sizes) -> u64 {
