@@ -115,7 +115,8 @@ fn bounds_of(collider: Collider) -> Aabb {
         return Aabb(vec3<f32>(FAR), 0u, vec3<f32>(-FAR), 0u);
     }
     let dynamic = moves(state.flags);
-    let body = collider.body | AABB_LIVE | select(0u, AABB_DYNAMIC, dynamic);
+    let fixed = (state.flags & BODY_KIND) == BODY_FIXED;
+    let body = collider.body | AABB_LIVE | select(0u, AABB_DYNAMIC, dynamic) | select(0u, AABB_FIXED, fixed);
     let offset = rotate(state.rotation, collider.position);
     let middle = state.position + offset;
     let orientation = multiply(state.rotation, collider.rotation);

@@ -91,11 +91,13 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         Control {
             stop, overflow, needed, step, old_pair_count, free_count, recolor, frozen_count, pair_count, processed,
             new_count, dead_count, constraint_count, point_count, batch_count, rounds, unplaced, last_count,
-            large_count, max_degree, solved, pad_c, cell_class, cell_bits, center_min, inverse_cell, center_max,
+            large_count, max_degree, solved, turns, cell_class, cell_bits, center_min, inverse_cell, center_max,
             pad_a, batch_start, quarantined, pad_b
         }
         EditRecord { op, target, kind, generation, data }
         EditRange { first, count }
+        TreeNode { min, child, max, escape }
+        TreeInfo { count, members, words, capacity }
         StepParams {
             dt, h, inverse_h, substeps, gravity, step, bias_rate, mass_scale, impulse_scale, push_speed,
             speculative_distance, restitution_threshold, body_count, collider_count, pair_capacity, cell_table_bits,
@@ -120,17 +122,18 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
     constants! {
         body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN }
         shape_kind as "SHAPE_" { NONE, BALL, CUBOID, HALFSPACE }
-        aabb_body as "AABB_" { INDEX, DYNAMIC, LIVE }
+        aabb_body as "AABB_" { INDEX, FIXED, DYNAMIC, LIVE }
         pair_kind as "PAIR_" {
             NONE, BALL_BALL, BALL_CUBOID, CUBOID_CUBOID, BALL_HALFSPACE, CUBOID_HALFSPACE, COUNT, MASK, FRESH
         }
-        overflow as "OVERFLOW_" { NONE, PAIRS, CELL, LAST_BATCH }
+        overflow as "OVERFLOW_" { NONE, PAIRS, TURNS, LAST_BATCH, UNBOUNDED }
         edit_op as "EDIT_" {
             SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, COLLIDER,
             COLLIDER_REMOVE
         }
+        tree_members as "MEMBERS_" { MOVING, FIXED, LARGE }
         ;
-        BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT
+        BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT, NO_NODE
     }
 }
 

@@ -12,8 +12,9 @@ const QUARANTINE_NAMES: u32 = 8u;
 
 const OVERFLOW_NONE: u32 = 0u;
 const OVERFLOW_PAIRS: u32 = 1u;
-const OVERFLOW_CELL: u32 = 2u;
+const OVERFLOW_TURNS: u32 = 2u;
 const OVERFLOW_LAST_BATCH: u32 = 3u;
+const OVERFLOW_UNBOUNDED: u32 = 4u;
 
 const CONTROL_STOP: u32 = 0u;
 const CONTROL_OVERFLOW: u32 = 1u;
@@ -36,6 +37,7 @@ const CONTROL_LAST_COUNT: u32 = 17u;
 const CONTROL_LARGE_COUNT: u32 = 18u;
 const CONTROL_MAX_DEGREE: u32 = 19u;
 const CONTROL_SOLVED: u32 = 20u;
+const CONTROL_TURNS: u32 = 21u;
 const CONTROL_CELL_CLASS: u32 = 22u;
 const CONTROL_CELL_BITS: u32 = 23u;
 const CONTROL_CENTER_MIN: u32 = 24u;
@@ -66,7 +68,7 @@ struct Control {
     large_count: u32,
     max_degree: u32,
     solved: u32,
-    pad_c: u32,
+    turns: u32,
     cell_class: u32,
     cell_bits: u32,
     center_min: vec3<u32>,

@@ -1,7 +1,8 @@
 //! Changes between steps. Each becomes a record in an ordered log; a gated pass applies the records at the start of
 //! their step, on whichever side the world runs, so that a step run again neither loses nor doubles one.
 
-use crate::builder::{ColliderBuilder, RigidBodyBuilder, check_finite, check_position, check_rotation, check_speed};
+use crate::builder::{ColliderBuilder, RigidBodyBuilder, RigidBodyType, check_finite, check_position, check_rotation, check_speed};
+use crate::choice::Spread;
 use crate::error::{Result, check};
 use crate::handle::{BodyHandle, ColliderHandle, Inserted};
 use crate::layout::{BodyProps, Collider, EditRange, EditRecord, edit_op};
@@ -23,14 +24,27 @@ pub struct Editor {
     pushes: HashMap<u32, u32>,
     /// Whether something came that the plan may not have yet.
     grown: bool,
+    spread: Spread,
+    stale: Stale,
 }
 
 /// Most impulses and forces on one body in one step: one loop of a shader applies them.
 const MAX_PUSHES: u32 = 49_000;
 
+/// What edits mean for a tree over colliders that is kept from step to step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Stale {
+    /// A collider that is not fixed came or went.
+    pub moving: bool,
+    /// A fixed one came, went, or was moved.
+    pub fixed: bool,
+}
+
 /// The edits of one step, grouped by what they change.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct EditBatch {
+    /// Which trees they make stale.
+    pub stale: Stale,
     /// Sorted by target, in the order of the calls within one.
     pub records: Vec<EditRecord>,
     /// One for each body or collider that changes.
@@ -41,7 +55,21 @@ impl Editor {
     /// Takes over a scene whose packed form a backend is about to load.
     pub fn new(scene: Scene) -> Result<(Self, PackedScene)> {
         let packed = PackedScene::new(&scene)?;
-        Ok((Self { scene, plan: packed.plan, records: Vec::new(), pushes: HashMap::new(), grown: false }, packed))
+        let editor = Self {
+            plan: packed.plan,
+            spread: Spread::of(&scene),
+            scene,
+            records: Vec::new(),
+            pushes: HashMap::new(),
+            grown: false,
+            stale: Stale::default(),
+        };
+        Ok((editor, packed))
+    }
+
+    /// What the choice of a broad phase rests on: looked at anew when the number of colliders has changed by a quarter.
+    pub fn spread(&self) -> &Spread {
+        &self.spread
     }
 
     /// The scene as edited so far. Poses and velocities in it are those at insertion.
@@ -73,6 +101,7 @@ impl Editor {
     pub fn insert(&mut self, body: RigidBodyBuilder, collider: ColliderBuilder) -> Result<Inserted> {
         let inserted = self.scene.try_insert(body, collider)?;
         self.grown = true;
+        self.touch(inserted.body, true);
         let PackedBody { state, props, colliders } = pack_body(&self.scene, inserted.body)?;
         let mut spawn = self.props_record(edit_op::SPAWN, inserted.body, &props);
         spawn.kind = state.flags;
@@ -94,6 +123,7 @@ impl Editor {
         let before = pack_body(&self.scene, body)?.props;
         let handle = self.scene.attach(body, collider)?;
         self.grown = true;
+        self.touch(body, true);
         self.restore_props(body, &before);
         let PackedBody { props, colliders, .. } = pack_body(&self.scene, body)?;
         let mut record = self.props_record(edit_op::PROPS, body, &props);
@@ -109,6 +139,7 @@ impl Editor {
     /// Removes a body with its colliders and contacts.
     pub fn remove(&mut self, body: BodyHandle) -> Result<()> {
         let colliders: Vec<_> = self.scene.colliders_of(body)?.into_iter().map(|(h, _)| h.slot()).collect();
+        self.touch(body, true);
         self.scene.remove(body)?;
         self.push(edit_op::REMOVE, body, [0.0; 4], [0.0; 4]);
         for slot in colliders {
@@ -201,6 +232,10 @@ impl Editor {
             let needed = Plan::of(&self.scene);
             self.plan.widen(&needed);
         }
+        let (count, before) = (self.scene.collider_count() as u64, u64::from(self.spread.all));
+        if 4 * count > 5 * before || 2 * count < before {
+            self.spread = Spread::of(&self.scene);
+        }
         let mut records = std::mem::take(&mut self.records);
         records.sort_by_key(target_key);
         let mut ranges: Vec<EditRange> = Vec::new();
@@ -210,12 +245,14 @@ impl Editor {
                 _ => ranges.push(EditRange { first: i as u32, count: 1 }),
             }
         }
-        EditBatch { records, ranges }
+        EditBatch { stale: std::mem::take(&mut self.stale), records, ranges }
     }
 
     /// Takes edits back that were handed over for a step that did not run, before those made since.
     pub fn put_back(&mut self, batch: EditBatch) {
         self.records.splice(..0, batch.records);
+        self.stale.moving |= batch.stale.moving;
+        self.stale.fixed |= batch.stale.fixed;
     }
 
     /// Before the first of the body's edits in this step goes a record of its properties, where there is none yet: a
@@ -243,7 +280,16 @@ impl Editor {
         Ok(())
     }
 
+    /// An edit of this body; `members` when its colliders come or go.
+    fn touch(&mut self, body: BodyHandle, members: bool) {
+        match self.scene.body(body) {
+            Ok(builder) if builder.body_type == RigidBodyType::Fixed => self.stale.fixed = true,
+            _ => self.stale.moving |= members,
+        }
+    }
+
     fn push(&mut self, op: u32, body: BodyHandle, a: [f32; 4], b: [f32; 4]) {
+        self.touch(body, false);
         let zero = [0; 4];
         self.records.push(EditRecord {
             op,

@@ -108,7 +108,8 @@ pub(crate) fn check(
 
 fn advice(buffer: &str) -> &'static str {
     match buffer {
-        "cell" => "too many colliders lie around one place: spread them out",
+        "partners" => "too many colliders lie around one place: spread them out",
+        "half-spaces" => "every collider is tested against each of them: use fewer, or large cuboids",
         "last batch" => {
             "too many contacts on bodies that touch more than 63 others: split those bodies or spread the others out"
         }

@@ -5,6 +5,7 @@
 //! [`StepReport`] and poses.
 
 mod builder;
+mod choice;
 pub mod edit;
 mod error;
 mod handle;
@@ -21,14 +22,16 @@ mod scene;
 pub mod scenes;
 mod shape;
 pub mod validate;
+pub mod wear;
 
 pub use builder::{ColliderBuilder, CombineRule, RigidBodyBuilder, RigidBodyType};
+pub use choice::Spread;
 pub use edit::Editor;
 pub use error::{Error, Result};
 pub use handle::{BodyHandle, ColliderHandle, Inserted};
 pub use mass::MassProperties;
 pub use packed::PackedScene;
-pub use params::{Broadphase, Capacities, Params};
+pub use params::{Broadphase, Capacities, MortonBits, Params, Traversal};
 pub use plan::Plan;
 pub use poses::{Pose, Poses, Velocities, Velocity};
 pub use report::{Penetration, StageTime, StepReport};

@@ -11,20 +11,29 @@ pub const BATCH_ROUNDS: u32 = 62;
 /// Most constraints in the last batch: each is one turn of a loop, and some drivers end loops at 65,535 turns.
 pub const LAST_LIMIT: u32 = 32_768;
 
-/// Most candidates around one collider that the grid visits: the same bound.
-pub const CELL_LOOP_LIMIT: u32 = 50_000;
+/// Most turns that the search for one collider's partners takes, candidates of the grid or nodes of a tree: the same
+/// bound.
+pub const TURN_LIMIT: u32 = 50_000;
 
-/// Most colliders outside the grid, half-spaces above all: the same bound.
-pub const LARGE_LOOP_LIMIT: u32 = 8192;
+/// Most colliders without end (half-spaces), which are tested against all: the same bound, and with the above below it.
+pub const UNBOUNDED_LIMIT: u32 = 8192;
+
+/// Most slices of a sliced grid: their sizes are added up in two words.
+pub const SLICE_LIMIT: u32 = 65_536;
+
+/// Candidates that one turn of work of the sweep looks at.
+pub const SWEEP_CHUNK: u32 = 256;
 
 /// How large the grid's cell table is for `colliders` colliders: log2 of at least two cells each.
 pub fn cell_table_bits(colliders: u32) -> u32 {
     (colliders.max(1) * 2).next_power_of_two().trailing_zeros().clamp(6, 24)
 }
 
-/// How many colliders may be left out of the grid because they are larger than a cell.
-pub fn large_limit(colliders: u32) -> u32 {
-    8 + (colliders / 1024).min(56)
+/// How many colliders may be left out of the grid because they are larger than a cell: a few, that all are tested
+/// against, or an eighth when these have a tree.
+pub fn large_limit(colliders: u32, tree: bool) -> u32 {
+    let few = 8 + (colliders / 1024).min(56);
+    if tree { few.max(colliders / 8) } else { few }
 }
 
 /// Room in the pair list at first.

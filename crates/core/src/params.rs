@@ -4,16 +4,64 @@ use crate::error::{Result, check};
 use crate::layout::StepParams;
 use crate::limits::{BATCH_ROUNDS, BYTES_A_PAIR, LAST_LIMIT};
 use glam::Vec3;
+use std::fmt;
 
 /// Which broad phase finds the pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum Broadphase {
-    /// The best one for the scene; today the grid.
+    /// The one that the scene's size, count and extent call for, see [`Broadphase::for_scene`].
     #[default]
     Auto,
-    /// Uniform grid; colliders larger than a cell are tested apart.
+    /// Every collider against every other: for tiny worlds, and as an oracle.
+    BruteForce,
+    /// Uniform grid whose table wraps; colliders larger than a cell take another path.
     Grid,
+    /// The same grid, stored slice by slice along its longest axis, each slice with bounds of its own: for domains that
+    /// are wide and sparse.
+    SlicedGrid,
+    /// Linear bounding volume hierarchy: any sizes.
+    Lbvh,
+    /// Sort and sweep along the axis of largest variance: long, thin scenes.
+    SweepAndPrune,
+}
+
+impl fmt::Display for Broadphase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Auto => "auto",
+            Self::BruteForce => "brute force",
+            Self::Grid => "grid",
+            Self::SlicedGrid => "sliced grid",
+            Self::Lbvh => "lbvh",
+            Self::SweepAndPrune => "sweep and prune",
+        })
+    }
+}
+
+/// How a tree is walked. All find the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
+pub enum Traversal {
+    /// Each node knows where to go on when its subtree is done or not entered; no memory of the way.
+    #[default]
+    Escape,
+    /// One bit a level tells whether the other child is still to be seen, and links to the parents lead there
+    /// (Harada, GDC 2009).
+    History,
+    /// A short stack a thread.
+    Stack,
+}
+
+/// Precision of the codes along which a tree is sorted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
+pub enum MortonBits {
+    /// 10 bits an axis: cells of a thousandth of the scene's extent.
+    #[default]
+    Bits30,
+    /// 21 bits an axis, for domains so wide that bodies would share such cells.
+    Bits63,
 }
 
 /// Room in buffers at first, and whether there may be more.
@@ -61,8 +109,12 @@ pub struct Params {
     pub speculative_distance: f32,
     /// Slowest approach that bounces, m/s. 0.5 at first.
     pub restitution_threshold: f32,
-    /// Which broad phase.
+    /// Which broad phase. All find the same pairs, so that results do not depend on it.
     pub broadphase: Broadphase,
+    /// How trees are walked.
+    pub traversal: Traversal,
+    /// Precision of the trees' codes.
+    pub morton_bits: MortonBits,
     /// Room in buffers.
     pub capacities: Capacities,
     /// Worker threads of the CPU side; `None`: one a core. The result is the same for any number.
@@ -83,6 +135,8 @@ impl Default for Params {
             speculative_distance: 0.02,
             restitution_threshold: 0.5,
             broadphase: Broadphase::Auto,
+            traversal: Traversal::default(),
+            morton_bits: MortonBits::default(),
             capacities: Capacities::default(),
             threads: None,
             profile: false,

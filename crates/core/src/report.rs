@@ -1,6 +1,7 @@
 //! What a step did.
 
 use crate::layout::{Control, QUARANTINE_NAMES};
+use crate::params::Broadphase;
 use std::fmt;
 
 /// Time of one stage in one step.
@@ -54,6 +55,12 @@ pub struct StepReport {
     pub growths: Vec<(&'static str, u32)>,
     /// Bytes that the world holds.
     pub memory_bytes: u64,
+    /// The broad phase that ran, never `Auto`.
+    pub broadphase: Broadphase,
+    /// Bytes of them that are the broad phase's own: cells or trees, the pair list not counted.
+    pub broadphase_bytes: u64,
+    /// Turns that the search for partners took, over all colliders, modulo 2^32: cells' entries or trees' nodes.
+    pub broadphase_turns: u32,
     /// Milliseconds a stage, when profiling.
     pub stages: Vec<StageTime>,
 }
@@ -71,6 +78,7 @@ impl StepReport {
             batches: control.batch_count,
             batch_rounds: control.rounds,
             last_batch: control.last_count,
+            broadphase_turns: control.turns,
             lost,
             quarantined: control.frozen_count,
             newly_quarantined: control.quarantined[..QUARANTINE_NAMES]
@@ -80,6 +88,11 @@ impl StepReport {
                 .collect(),
             ..Self::default()
         }
+    }
+
+    /// Bytes of the broad phase for each body.
+    pub fn broadphase_bytes_per_body(&self) -> f64 {
+        self.broadphase_bytes as f64 / f64::from(self.bodies.max(1))
     }
 
     /// How often `buffer` grew.
@@ -103,6 +116,7 @@ impl fmt::Display for StepReport {
             self.batches,
             self.last_batch
         )?;
+        write!(f, ", {} ({:.0} bytes a body)", self.broadphase, self.broadphase_bytes_per_body())?;
         if self.lost > 0 {
             write!(f, "; LOST {}", self.lost)?;
         }

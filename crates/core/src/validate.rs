@@ -1,20 +1,28 @@
 //! Checks of the flat arrays between passes: what each pass may rely on. Each says in words what is wrong first.
 
-use crate::layout::{BodyState, ConstraintHead, LAST_BATCH, Pair};
+use crate::layout::{BodyState, ConstraintHead, LAST_BATCH, NO_NODE, Pair, TreeNode, root_of};
 use std::collections::HashMap;
 
 /// Every pair has `a < b`, and the list rises strictly by (a, b).
 pub fn sorted_pairs(pairs: &[Pair]) -> Result<(), String> {
-    for (i, pair) in pairs.iter().enumerate() {
-        if pair.a >= pair.b {
-            return Err(format!("pair {i} is ({}, {}): a must be below b", pair.a, pair.b));
+    rises(pairs.iter().map(|pair| (pair.a, pair.b)))
+}
+
+/// The same of a list of collider slots (a, b), as broad phases leave it.
+pub fn pairs(pairs: &[[u32; 2]]) -> Result<(), String> {
+    rises(pairs.iter().map(|&[a, b]| (a, b)))
+}
+
+fn rises(pairs: impl Iterator<Item = (u32, u32)>) -> Result<(), String> {
+    let mut before = None;
+    for (i, pair) in pairs.enumerate() {
+        if pair.0 >= pair.1 {
+            return Err(format!("pair {i} is {pair:?}: a must be below b"));
         }
-    }
-    for (i, two) in pairs.windows(2).enumerate() {
-        if (two[0].a, two[0].b) >= (two[1].a, two[1].b) {
-            let (before, after) = ((two[0].a, two[0].b), (two[1].a, two[1].b));
-            return Err(format!("pair {} is {after:?} and does not come after {before:?}", i + 1));
+        if let Some(before) = before.filter(|before| *before >= pair) {
+            return Err(format!("pair {i} is {pair:?} and does not come after {before:?}"));
         }
+        before = Some(pair);
     }
     Ok(())
 }
@@ -75,4 +83,98 @@ pub fn finite_states(states: &[BodyState]) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+/// Where a collider belongs in a grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Nowhere: it is no live collider, or has no end.
+    None,
+    /// In this cell of the table.
+    Cell(usize),
+    /// In the list of those larger than a cell.
+    Large,
+}
+
+/// Cells of a grid: `start` rises from 0 to the number of entries, and each of `colliders` colliders stands exactly where
+/// `place` says.
+pub fn cells(
+    start: &[u32],
+    entries: &[u32],
+    large: &[u32],
+    colliders: u32,
+    place: impl Fn(u32) -> Place,
+) -> Result<(), String> {
+    if start.first() != Some(&0) || start.last().map(|&end| end as usize) != Some(entries.len()) {
+        return Err(format!("cells begin at {:?} and end at {:?} of {}", start.first(), start.last(), entries.len()));
+    }
+    if let Some(cell) = start.windows(2).position(|two| two[0] > two[1]) {
+        return Err(format!("cell {cell} begins at {} and ends at {}", start[cell], start[cell + 1]));
+    }
+    let mut found = vec![Place::None; colliders as usize];
+    let mut stand = |i: u32, at: Place| match found.get_mut(i as usize) {
+        None => Err(format!("collider {i} of {colliders} is at {at:?}")),
+        Some(seen) if *seen != Place::None => Err(format!("collider {i} is at {seen:?} and at {at:?}")),
+        Some(seen) => {
+            *seen = at;
+            Ok(())
+        }
+    };
+    for (cell, range) in start.windows(2).enumerate() {
+        entries[range[0] as usize..range[1] as usize].iter().try_for_each(|&i| stand(i, Place::Cell(cell)))?;
+    }
+    large.iter().try_for_each(|&i| stand(i, Place::Large))?;
+    match (0..colliders).find(|&i| found[i as usize] != place(i)) {
+        Some(i) => Err(format!("collider {i} is at {:?} and belongs at {:?}", found[i as usize], place(i))),
+        None => Ok(()),
+    }
+}
+
+/// A tree over `count` leaves: from the root, each node comes once, children lie within their node's box, leaves have the
+/// boxes that `leaf_box` (lower and upper corner by collider) gives, the last leaf's escape ends the walk, and walking
+/// from left to right by escapes meets the leaves in order.
+pub fn tree(nodes: &[TreeNode], count: u32, leaf_box: impl Fn(u32) -> [[f32; 3]; 2]) -> Result<(), String> {
+    let root = root_of(count);
+    if root == NO_NODE {
+        return Ok(());
+    }
+    if nodes.len() < 2 * count as usize - usize::from(count > 0) {
+        return Err(format!("{} nodes are too few for {count} leaves", nodes.len()));
+    }
+    let mut stack = vec![(root, NO_NODE)];
+    let (mut next_leaf, mut seen) = (0, 0u32);
+    while let Some((id, escape)) = stack.pop() {
+        let node = nodes.get(id as usize).ok_or_else(|| format!("node {id} of {}", nodes.len()))?;
+        seen += 1;
+        if seen > 2 * count - 1 {
+            return Err(format!("more than {} nodes hang on the root", 2 * count - 1));
+        }
+        if node.escape != escape {
+            return Err(format!("node {id} escapes to {} and not to {escape}", node.escape));
+        }
+        if id % 2 == 0 {
+            if id / 2 != next_leaf {
+                return Err(format!("leaf {} comes where leaf {next_leaf} should", id / 2));
+            }
+            next_leaf += 1;
+            let [min, max] = leaf_box(node.child);
+            if (node.min, node.max) != (min, max) {
+                return Err(format!("leaf {} (collider {}) has not the collider's box", id / 2, node.child));
+            }
+            continue;
+        }
+        let left = nodes.get(node.child as usize).ok_or_else(|| format!("node {id}: left child {}", node.child))?;
+        let right = nodes.get(left.escape as usize).ok_or_else(|| format!("node {id}: right child {}", left.escape))?;
+        for i in 0..3 {
+            if node.min[i] != left.min[i].min(right.min[i]) || node.max[i] != left.max[i].max(right.max[i]) {
+                return Err(format!("node {id} is not the union of its children along axis {i}"));
+            }
+        }
+        stack.push((left.escape, escape));
+        stack.push((node.child, left.escape));
+    }
+    match next_leaf == count {
+        true => Ok(()),
+        false => Err(format!("{next_leaf} of {count} leaves hang on the root")),
+    }
 }

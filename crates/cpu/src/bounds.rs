@@ -59,7 +59,11 @@ pub fn collider_bounds(collider: &Collider, state: &BodyState, props: &BodyProps
         return Aabb { min: [FAR; 3], body: 0, max: [-FAR; 3], class: 0 };
     }
     let dynamic = moves(state.flags);
-    let body = collider.body | aabb_body::LIVE | if dynamic { aabb_body::DYNAMIC } else { 0 };
+    let fixed = state.flags & body_flags::KIND == body_flags::FIXED;
+    let body = collider.body
+        | aabb_body::LIVE
+        | if dynamic { aabb_body::DYNAMIC } else { 0 }
+        | if fixed { aabb_body::FIXED } else { 0 };
     let rotation = quat(state.rotation);
     let offset = rotate(rotation, vec3(collider.position));
     let center = vec3(state.position) + offset;

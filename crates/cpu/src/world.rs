@@ -1,7 +1,7 @@
 //! A world on the CPU: buffers, the order of the passes, capacity and the edit log.
 
 use crate::batch::{self, Batches};
-use crate::broadphase::grid;
+use crate::broadphase::{self, Boxes, Finder, Search, TooMany};
 use crate::contact::{self, Matched};
 use crate::shared::Shared;
 use crate::solver::{self, Rows, prepare, store};
@@ -15,7 +15,7 @@ use tumble_core::layout::{
     QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, body_flags,
 };
 use tumble_core::limits::{self, Room};
-use tumble_core::{Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
+use tumble_core::{Broadphase, Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
 
 /// A simulation on the CPU.
 pub struct World {
@@ -28,6 +28,7 @@ pub struct World {
     adapter: String,
     growths: Vec<(&'static str, u32)>,
     drop_pair: u32,
+    finder: Finder,
 }
 
 /// What lives past a step; written only when a step commits (properties and colliders by edits, absolutely).
@@ -116,6 +117,7 @@ impl World {
             adapter,
             growths: Vec::new(),
             drop_pair: u32::MAX,
+            finder: Finder::default(),
         })
     }
 
@@ -173,7 +175,7 @@ impl World {
         step.collider_count = needed.colliders;
         step.edit_ranges = edits.ranges.len() as u32;
         step.cell_table_bits = limits::cell_table_bits(step.collider_count);
-        step.large_limit = limits::large_limit(step.collider_count);
+        step.large_limit = limits::large_limit(step.collider_count, self.editor.spread().is_wide());
         step.drop_pair = self.drop_pair;
         if let Err(error) = self.run(&edits, step) {
             self.editor.put_back(edits);
@@ -206,15 +208,17 @@ impl World {
     /// Plans and commits a step, growing the pair list between where that is needed and allowed.
     fn run(&mut self, edits: &EditBatch, mut step: StepParams) -> Result<()> {
         let restitution = self.editor.plan().restitution;
+        let broadphase = self.params.broadphase.resolve(self.editor.spread());
         loop {
             let mut watch = Stopwatch::new(self.params.profile);
             step.pair_capacity = (self.kept.impulses.len() / 4) as u32;
-            let (kept, pool) = (&mut self.kept, &self.pool);
-            let planned = pool.install(|| kept.plan(edits, &step, &mut watch));
+            let (kept, pool, finder) = (&mut self.kept, &self.pool, &mut self.finder);
+            let asked = Asked { edits, params: &self.params, broadphase };
+            let planned = pool.install(|| kept.plan(&asked, finder, &step, &mut watch));
             match planned {
                 Ok(planned) => {
                     pool.install(|| kept.commit(planned, &step, restitution, &mut watch));
-                    self.finish(watch);
+                    self.finish(watch, broadphase);
                     return Ok(());
                 }
                 Err(overflow) => self.grow(overflow)?,
@@ -240,16 +244,26 @@ impl World {
         }
     }
 
-    fn finish(&mut self, watch: Stopwatch) {
+    fn finish(&mut self, watch: Stopwatch, broadphase: Broadphase) {
         let mut report = StepReport::from_control(&self.kept.control);
         report.backend = "cpu";
         report.adapter = self.adapter.clone();
         report.bodies = self.editor.scene().len() as u32;
         report.growths = self.growths.clone();
-        report.memory_bytes = self.kept.bytes();
+        report.broadphase = broadphase;
+        report.broadphase_bytes = self.finder.bytes();
+        report.memory_bytes = self.kept.bytes() + self.finder.bytes();
         report.stages = watch.stages;
         self.report = report;
     }
+}
+
+/// What a step is to do, beside its numbers.
+#[derive(Clone, Copy)]
+struct Asked<'a> {
+    edits: &'a EditBatch,
+    params: &'a Params,
+    broadphase: Broadphase,
 }
 
 /// A bound that the plan phase found passed.
@@ -284,39 +298,39 @@ impl Kept {
         let collider = size_of::<Collider>() + size_of::<Aabb>();
         let slot = 8 + 4 * size_of::<Impulse>() + size_of::<FoundManifold>();
         let pair = 2 * size_of::<Pair>() + size_of::<Manifold>() + 12;
-        let cells = 8 << limits::cell_table_bits(self.colliders.len() as u32);
         let counted = self.states.len() * body
             + self.colliders.len() * collider
             + self.batch_of_slot.len() * slot
-            + self.pairs.len() * pair
-            + cells;
+            + self.pairs.len() * pair;
         counted as u64 + self.rows.bytes()
     }
 
     /// Everything up to the first write to what lives past the step.
     fn plan(
         &mut self,
-        edits: &EditBatch,
+        asked: &Asked,
+        finder: &mut Finder,
         step: &StepParams,
         watch: &mut Stopwatch,
     ) -> std::result::Result<Planned, Overflow> {
         let mut control = Control { step: step.step, recolor: self.control.recolor, ..Control::zeroed() };
-        let states = self.edit(edits, step);
+        let states = self.edit(asked.edits, step);
         let states = self.quarantine(states, &mut control);
         watch.lap("edit");
         let aabbs: Vec<Aabb> =
             self.colliders.par_iter().with_min_len(256).map(|c| self.bounds(c, &states, step)).collect();
         watch.lap("bounds");
-        let grid = grid::choose(&aabbs, step);
-        let cells = grid::fill(&grid, &aabbs, step);
-        let found = grid::find_pairs_up_to(&grid, &cells, &aabbs, step.pair_capacity);
+        let Asked { edits, params, broadphase } = *asked;
+        let boxes = Boxes::new(&aabbs);
+        let found = finder.find(&boxes, &Search { step, params, broadphase, stale: edits.stale });
         watch.lap("broadphase");
         control.pair_count = found.count.min(u32::MAX.into()) as u32;
-        control.large_count = cells.large.len() as u32;
-        control.cell_class = grid.cell_class;
+        control.turns = found.turns;
         let over = |buffer, needed: u32, capacity: u32| Err(Overflow { buffer, needed: needed.into(), capacity });
-        if let Some(crowd) = grid::too_crowded(&found, &cells) {
-            return over("cell", crowd, limits::CELL_LOOP_LIMIT);
+        match broadphase::too_many(&boxes, &found) {
+            Some(TooMany::Turns(turns)) => return over("partners", turns, limits::TURN_LIMIT),
+            Some(TooMany::Unbounded(count)) => return over("half-spaces", count, limits::UNBOUNDED_LIMIT),
+            None => {}
         }
         if control.pair_count > step.pair_capacity {
             return over("pairs", control.pair_count, step.pair_capacity);

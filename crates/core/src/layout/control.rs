@@ -15,10 +15,12 @@ pub mod overflow {
     pub const NONE: u32 = 0;
     /// The pair list and all that is sized by it.
     pub const PAIRS: u32 = 1;
-    /// More candidates around one collider than a shader's loop may visit.
-    pub const CELL: u32 = 2;
+    /// The search for one collider's partners takes more turns than a shader's loop may.
+    pub const TURNS: u32 = 2;
     /// More constraints in the last batch than a shader's loop may visit.
     pub const LAST_BATCH: u32 = 3;
+    /// More colliders without end than a shader's loop may visit.
+    pub const UNBOUNDED: u32 = 4;
 }
 
 /// Counters and decisions of a step, kept where the passes run. 448 bytes.
@@ -66,14 +68,14 @@ pub struct Control {
     pub unplaced: u32,
     /// Constraints in the last batch.
     pub last_count: u32,
-    /// Colliders too large for the grid.
+    /// Colliders that all others are tested against: those without end, and the few too large for a grid.
     pub large_count: u32,
     /// Most constraints on one dynamic body.
     pub max_degree: u32,
     /// Constraints that the solver visited.
     pub solved: u32,
-    /// Unused.
-    pub pad_c: u32,
+    /// Turns of all searches for partners, modulo 2^32.
+    pub turns: u32,
     /// Size class of the grid's cells.
     pub cell_class: u32,
     /// Bits of the cell index along x | y << 8 | z << 16.

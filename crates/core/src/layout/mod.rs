@@ -10,6 +10,7 @@ mod control;
 mod edit;
 mod manifold;
 mod step;
+mod tree;
 
 pub use body::{BodyProps, BodyState, PoseRecord, SolverBody, body_flags, pose_tag};
 pub use collider::{Aabb, Collider, aabb_body, shape_kind};
@@ -18,3 +19,4 @@ pub use control::{BATCHES, Control, LAST_BATCH, QUARANTINE_NAMES, UNBATCHED, ove
 pub use edit::{EditRange, EditRecord, edit_op};
 pub use manifold::{FoundManifold, Manifold, ManifoldPoint, NO_SLOT, Pair, pair_kind};
 pub use step::StepParams;
+pub use tree::{NO_NODE, TreeInfo, TreeNode, root_of, tree_members};

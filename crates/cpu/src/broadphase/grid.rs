@@ -2,64 +2,90 @@
 //!
 //! After Le Grand, "Broad-Phase Collision Detection with CUDA" (GPU Gems 3, 2007) and Harada (GDC 2009): a collider
 //! goes into the one cell that holds the middle of its box; a cell is wider than any box in it, so partners lie in
-//! the 27 cells around. The cell's size is chosen in each step from a histogram of size classes: the smallest class
-//! that leaves no more than `large_limit` colliders out. Those, half-spaces among them, are tested against all.
+//! the 27 cells around, of which each collider looks at half. The cell's size is chosen in each step from a histogram of
+//! size classes: the smallest class that leaves no more than `large_limit` bounded colliders out. Those are tested
+//! against all, or go into a tree ([`Large`]).
 //!
-//! The table wraps: cell (x, y, z) lies at the low bits of its coordinates, at least two bits an axis, so that the 27
-//! neighbours never fold onto each other; what folds from afar is thrown out by the boxes. Coordinates are one
-//! multiplication, and cells are 1/16 wider than their class, which outweighs its rounding up to 2^19 cells from the
-//! origin; beyond, coordinates stop there, which keeps neighbours neighbours.
+//! Cells lie in a table in one of two ways. *Wrapped*: cell (x, y, z) lies at the low bits of its coordinates, at least
+//! two bits an axis, so that the 27 neighbours never fold onto each other; what folds from afar is thrown out by the
+//! boxes. *Sliced*, after Harada et al., "Sliced Data Structure for Particle-Based Simulations on GPUs" (GRAPHITE 2007):
+//! the domain is cut across its longest axis into slices one cell thick, and each slice has the cells of its own bounds
+//! alone. Where slices would need more cells than the table has, it wraps.
+//!
+//! Coordinates are one multiplication, and cells are 1/16 wider than their class, which outweighs its rounding up to 2^19
+//! cells from the origin; beyond, coordinates stop there, which keeps neighbours neighbours.
 
-use super::meets;
-use crate::bounds::{FAR, size_class};
-use rayon::prelude::*;
-use std::sync::atomic::{AtomicU64, Ordering};
-use tumble_core::layout::{Aabb, StepParams, aabb_body};
-use tumble_core::limits::{CELL_LOOP_LIMIT, LARGE_LOOP_LIMIT};
-
-/// Classes that a float's exponent and two mantissa bits can tell apart.
-pub const CLASSES: usize = 1024;
+use super::{Boxes, CLASSES, Found, Sink, bounded, center, collect, lbvh, matter, overlaps};
+use std::ops::Range;
+use tumble_core::{MortonBits, Traversal};
+use tumble_core::layout::{Aabb, StepParams};
+use tumble_core::limits::SLICE_LIMIT;
 
 /// How the grid lies in one step.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Grid {
     /// Colliders of a higher size class are large.
     pub cell_class: u32,
     /// 1 / cell edge, 1/m.
     pub inverse_cell: f32,
-    /// Bits of the table's index along each axis.
+    /// Bits of the table's index along each axis, where it wraps.
     pub bits: [u32; 3],
+    /// Where it does not.
+    pub slices: Option<Slices>,
 }
 
-/// What the grid found.
-#[derive(Debug, Default)]
-pub struct Found {
-    /// (a, b) with a < b, sorted; worth nothing when there are more than were asked for.
-    pub pairs: Vec<[u32; 2]>,
-    /// How many there are.
-    pub count: u64,
-    /// Most candidates that one collider had to look at.
-    pub most_candidates: u32,
+/// A grid in slices along its longest axis.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Slices {
+    /// The longest axis; the other two follow in cyclic order, the last one runs along rows.
+    pub axis: usize,
+    /// Coordinate of the first slice.
+    pub first: i32,
+    /// Lowest and highest cell of each slice along the other two axes; an empty slice has none.
+    pub bounds: Vec<SliceBounds>,
+    /// First cell of each slice; one more at the end.
+    pub start: Vec<u32>,
 }
 
-/// Lists of colliders by cell.
+/// Cells that a slice has along the axes after the slicing one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SliceBounds {
+    /// Lowest coordinates.
+    pub low: [i32; 2],
+    /// Highest; below the lowest when the slice is empty.
+    pub high: [i32; 2],
+}
+
+impl SliceBounds {
+    const EMPTY: Self = Self { low: [i32::MAX; 2], high: [i32::MIN; 2] };
+
+    /// Number of rows and of cells a row.
+    fn size(&self) -> [u32; 2] {
+        match self.low[0] > self.high[0] {
+            true => [0; 2],
+            false => std::array::from_fn(|i| (self.high[i] - self.low[i]) as u32 + 1),
+        }
+    }
+}
+
+/// Boxes of colliders by cell.
 #[derive(Debug, Default)]
 pub struct Cells {
     /// First entry of each cell; one more at the end.
     pub start: Vec<u32>,
-    /// Colliders, cell by cell, in ascending order within a cell.
-    pub entries: Vec<u32>,
-    /// Colliders outside the grid, ascending.
+    /// Boxes, cell by cell, in ascending order of colliders within a cell; the collider stands in `class`.
+    pub entries: Vec<Aabb>,
+    /// Bounded colliders outside the grid, ascending.
     pub large: Vec<u32>,
 }
 
-/// Whether the collider counts for the choice of the grid: it lives and has an end.
-fn bounded(aabb: &Aabb) -> bool {
-    aabb.body & aabb_body::LIVE != 0 && aabb.class < size_class(FAR)
-}
-
-fn center(aabb: &Aabb) -> [f32; 3] {
-    std::array::from_fn(|i| 0.5 * (aabb.min[i] + aabb.max[i]))
+/// What finds the pairs of bounded colliders outside the grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Large {
+    /// A few of them: every collider is tested against each.
+    List,
+    /// A tree of them, walked so.
+    Tree(Traversal),
 }
 
 /// 1 / (17/16 of the class's upper edge): a table for the mantissa, a power of two for the exponent.
@@ -77,22 +103,12 @@ fn coordinate(x: f32, inverse_cell: f32) -> i32 {
     (x * inverse_cell).floor().clamp(-524_288.0, 524_287.0) as i32
 }
 
-/// Chooses cell size and table from the size classes and the middles' range.
-pub fn choose(aabbs: &[Aabb], step: &StepParams) -> Grid {
-    let mut histogram = vec![0u32; CLASSES];
-    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-    for aabb in aabbs.iter().filter(|a| bounded(a)) {
-        histogram[aabb.class as usize] += 1;
-        let c = center(aabb);
-        for i in 0..3 {
-            low[i] = low[i].min(c[i]);
-            high[i] = high[i].max(c[i]);
-        }
-    }
+/// Chooses cell size and table from the size classes and the middles' range. The table wraps.
+pub fn choose(boxes: &Boxes, step: &StepParams) -> Grid {
     let mut above = 0;
     let mut cell_class = 0;
     for class in (0..CLASSES).rev() {
-        above += histogram[class];
+        above += boxes.classes[class];
         if above > step.large_limit {
             cell_class = class as u32;
             break;
@@ -101,10 +117,11 @@ pub fn choose(aabbs: &[Aabb], step: &StepParams) -> Grid {
     let inverse_cell = inverse_cell(cell_class);
     let mut cells = [0u32; 3];
     if cell_class != 0 {
-        cells =
-            std::array::from_fn(|i| (coordinate(high[i], inverse_cell) - coordinate(low[i], inverse_cell)) as u32 + 1);
+        cells = std::array::from_fn(|i| {
+            (coordinate(boxes.high[i], inverse_cell) - coordinate(boxes.low[i], inverse_cell)) as u32 + 1
+        });
     }
-    Grid { cell_class, inverse_cell, bits: split_bits(cells, step.cell_table_bits) }
+    Grid { cell_class, inverse_cell, bits: split_bits(cells, step.cell_table_bits), slices: None }
 }
 
 /// Shares the table's bits among the axes: two each, then one at a time to the axis that folds most.
@@ -124,10 +141,77 @@ pub fn split_bits(cells: [u32; 3], table_bits: u32) -> [u32; 3] {
     bits
 }
 
+/// The same grid in slices, where they fit the table.
+pub fn slice(grid: &Grid, boxes: &Boxes, step: &StepParams) -> Grid {
+    let room = 1u64 << step.cell_table_bits;
+    let low = boxes.low.map(|x| coordinate(x, grid.inverse_cell));
+    let high = boxes.high.map(|x| coordinate(x, grid.inverse_cell));
+    let extent: [u32; 3] = std::array::from_fn(|i| high[i].wrapping_sub(low[i]) as u32);
+    let axis = if extent[0] >= extent[1] && extent[0] >= extent[2] {
+        0
+    } else if extent[1] >= extent[2] {
+        1
+    } else {
+        2
+    };
+    if grid.cell_class == 0 || u64::from(extent[axis]) >= room.min(SLICE_LIMIT.into()) {
+        return grid.clone();
+    }
+    let mut slices =
+        Slices { axis, first: low[axis], bounds: vec![SliceBounds::EMPTY; extent[axis] as usize + 1], start: vec![0] };
+    for aabb in boxes.aabbs.iter().filter(|a| grid.holds(a)) {
+        let [s, row, column] = slices.turned(grid.cell(aabb));
+        let bounds = &mut slices.bounds[(s - slices.first) as usize];
+        for (i, x) in [row, column].into_iter().enumerate() {
+            bounds.low[i] = bounds.low[i].min(x);
+            bounds.high[i] = bounds.high[i].max(x);
+        }
+    }
+    let mut total = 0u64;
+    for bounds in &slices.bounds {
+        let [rows, columns] = bounds.size().map(u64::from);
+        total += (rows * columns).min(room + 1);
+        if total > room {
+            return grid.clone();
+        }
+        slices.start.push(total as u32);
+    }
+    Grid { slices: Some(slices), ..grid.clone() }
+}
+
+impl Slices {
+    /// A cell's coordinates as slice, row, place in the row.
+    fn turned(&self, cell: [i32; 3]) -> [i32; 3] {
+        std::array::from_fn(|i| cell[(self.axis + i) % 3])
+    }
+
+    /// Place of a cell that its slice has.
+    fn index(&self, cell: [i32; 3]) -> usize {
+        let [s, row, column] = self.turned(cell);
+        let slice = (s - self.first) as usize;
+        let SliceBounds { low, .. } = self.bounds[slice];
+        let columns = self.bounds[slice].size()[1];
+        (self.start[slice] + (row - low[0]) as u32 * columns + (column - low[1]) as u32) as usize
+    }
+
+    /// Cells from `column - 1` to `column + 1` of a row that its slice may or may not have.
+    fn row(&self, s: i32, row: i32, column: i32) -> Range<usize> {
+        let slice = s.wrapping_sub(self.first) as usize;
+        let Some(&bounds) = self.bounds.get(slice) else { return 0..0 };
+        let SliceBounds { low, high } = bounds;
+        let (from, to) = ((column - 1).max(low[1]), (column + 1).min(high[1]));
+        if row < low[0] || row > high[0] || from > to {
+            return 0..0;
+        }
+        let first = self.start[slice] + (row - low[0]) as u32 * bounds.size()[1];
+        (first + (from - low[1]) as u32) as usize..(first + (to - low[1]) as u32) as usize + 1
+    }
+}
+
 impl Grid {
     /// Whether the collider goes into the grid.
     pub fn holds(&self, aabb: &Aabb) -> bool {
-        aabb.body & aabb_body::LIVE != 0 && aabb.class <= self.cell_class
+        bounded(aabb) && aabb.class <= self.cell_class
     }
 
     /// Cell coordinates of the middle of a box.
@@ -135,106 +219,152 @@ impl Grid {
         center(aabb).map(|x| coordinate(x, self.inverse_cell))
     }
 
-    /// Place in the table.
+    /// Place in the table of a cell that is in it.
     pub fn index(&self, cell: [i32; 3]) -> usize {
+        match &self.slices {
+            Some(slices) => slices.index(cell),
+            None => self.wrapped(cell),
+        }
+    }
+
+    fn wrapped(&self, cell: [i32; 3]) -> usize {
         let low = |x: i32, bits: u32| x as u32 & ((1 << bits) - 1);
         let [bx, by, bz] = self.bits;
         (low(cell[0], bx) | low(cell[1], by) << bx | low(cell[2], bz) << (bx + by)) as usize
     }
+
+    /// Number of cells of the table in use.
+    fn table(&self, step: &StepParams) -> usize {
+        match &self.slices {
+            Some(slices) => slices.start[slices.start.len() - 1] as usize,
+            None => 1 << step.cell_table_bits,
+        }
+    }
+
+    /// Half of the cells around this one, as ranges of neighbours in the table: what lies behind it in its own row, and
+    /// the four rows after that, three cells of each. With every cell's, each pair of neighbours comes once.
+    fn ahead(&self, cell: [i32; 3], mut visit: impl FnMut(Range<usize>)) {
+        const ROWS: [[i32; 2]; 4] = [[0, 1], [1, -1], [1, 0], [1, 1]];
+        if let Some(slices) = &self.slices {
+            let [s, row, column] = slices.turned(cell);
+            let own = slices.row(s, row, column);
+            let index = slices.index(cell);
+            visit(index + 1..own.end);
+            ROWS.iter().for_each(|[ds, dr]| visit(slices.row(s + ds, row + dr, column)));
+            return;
+        }
+        let [x, y, z] = cell;
+        let next = self.wrapped([x + 1, y, z]);
+        visit(next..next + 1);
+        for [dz, dy] in ROWS {
+            let [a, b, c] = [x - 1, x, x + 1].map(|x| self.wrapped([x, y + dy, z + dz]));
+            if a + 2 == c {
+                visit(a..c + 1);
+            } else {
+                // The row's end is its beginning.
+                [a, b, c].into_iter().for_each(|place| visit(place..place + 1));
+            }
+        }
+    }
 }
 
 /// Sorts the colliders into cells: count, scan, scatter.
-pub fn fill(grid: &Grid, aabbs: &[Aabb], step: &StepParams) -> Cells {
-    let mut start = vec![0u32; (1 << step.cell_table_bits) + 1];
-    let mut large = Vec::new();
-    for (i, aabb) in aabbs.iter().enumerate() {
+pub fn fill(grid: &Grid, boxes: &Boxes, step: &StepParams) -> Cells {
+    let mut cells = Cells { start: vec![0u32; grid.table(step) + 1], ..Cells::default() };
+    let mut place = Vec::with_capacity(boxes.aabbs.len());
+    for (i, aabb) in boxes.aabbs.iter().enumerate() {
         if grid.holds(aabb) {
-            start[grid.index(grid.cell(aabb))] += 1;
-        } else if aabb.body & aabb_body::LIVE != 0 {
-            large.push(i as u32);
+            let index = grid.index(grid.cell(aabb)) as u32;
+            cells.start[index as usize] += 1;
+            place.push([i as u32, index]);
+        } else if bounded(aabb) {
+            cells.large.push(i as u32);
         }
     }
-    let total = crate::primitives::exclusive_scan(&mut start);
-    let mut entries = vec![0u32; total as usize];
-    let mut cursor = start.clone();
-    for (i, aabb) in aabbs.iter().enumerate().filter(|(_, a)| grid.holds(a)) {
-        let at = &mut cursor[grid.index(grid.cell(aabb))];
-        entries[*at as usize] = i as u32;
+    crate::primitives::exclusive_scan(&mut cells.start);
+    let mut cursor = cells.start.clone();
+    cells.entries = vec![bytemuck::Zeroable::zeroed(); place.len()];
+    for [i, index] in place {
+        let at = &mut cursor[index as usize];
+        cells.entries[*at as usize] = Aabb { class: i, ..boxes.aabbs[i as usize] };
         *at += 1;
     }
-    Cells { start, entries, large }
+    cells
 }
 
-/// All pairs. The shader counts, scans, fills and sorts; here each collider lists its partners of higher index in
-/// order, which is the same list.
-pub fn find_pairs(grid: &Grid, cells: &Cells, aabbs: &[Aabb]) -> Found {
-    find_pairs_up_to(grid, cells, aabbs, u32::MAX)
+impl Cells {
+    /// Panics unless every collider of the grid stands once, in its own cell, and the others are large ones.
+    pub fn assert_well_formed(&self, grid: &Grid, boxes: &Boxes) {
+        let cell_of = |i: u32| match &boxes.aabbs[i as usize] {
+            aabb if grid.holds(aabb) => tumble_core::validate::Place::Cell(grid.index(grid.cell(aabb))),
+            aabb if bounded(aabb) => tumble_core::validate::Place::Large,
+            _ => tumble_core::validate::Place::None,
+        };
+        let entries: Vec<u32> = self.entries.iter().map(|entry| entry.class).collect();
+        let checked =
+            tumble_core::validate::cells(&self.start, &entries, &self.large, boxes.aabbs.len() as u32, cell_of);
+        checked.unwrap_or_else(|error| panic!("{error}"));
+    }
 }
 
-/// The same for a list that has room for `most`: beyond, pairs are counted and not kept.
-pub fn find_pairs_up_to(grid: &Grid, cells: &Cells, aabbs: &[Aabb], most: u32) -> Found {
-    const CHUNK: usize = 256;
-    let count = AtomicU64::new(0);
-    let chunks: Vec<(Vec<[u32; 2]>, u32)> = (0..aabbs.len().div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|chunk| {
-            let mut pairs = Vec::with_capacity(CHUNK * 6);
-            let mut candidates = 0;
-            for i in chunk * CHUNK..((chunk + 1) * CHUNK).min(aabbs.len()) {
-                let before = pairs.len();
-                candidates = candidates.max(partners(grid, cells, aabbs, i as u32, &mut pairs));
-                let own = (pairs.len() - before) as u64;
-                if count.fetch_add(own, Ordering::Relaxed) + own > most.into() {
-                    pairs = Vec::new();
+/// All pairs; beyond `most` they are counted and not kept.
+pub fn find_pairs(grid: &Grid, cells: &Cells, boxes: &Boxes, large: Large, most: u32) -> Found {
+    match large {
+        Large::List => {
+            let mut list = [&boxes.unbounded[..], &cells.large[..]].concat();
+            list.sort_unstable();
+            collect(boxes, &list, cells.entries.len(), most, |range, sink| {
+                for k in range {
+                    sink.with_list(boxes, &list, cells.entries[k].class);
+                    let candidates = partners(grid, cells, k, sink);
+                    sink.took(candidates);
                 }
+            })
+        }
+        Large::Tree(traversal) => {
+            let mut tree = lbvh::Tree::of_members(boxes, &cells.large, MortonBits::Bits30);
+            if traversal == Traversal::History {
+                tree.link_parents();
             }
-            (pairs, candidates)
-        })
-        .collect();
-    let most_candidates = chunks.iter().map(|c| c.1).max().unwrap_or(0);
-    let mut pairs = Vec::with_capacity(chunks.iter().map(|c| c.0.len()).sum());
-    for (chunk, _) in &chunks {
-        pairs.extend_from_slice(chunk);
+            let held = cells.entries.len();
+            collect(boxes, &boxes.unbounded, held + cells.large.len(), most, |range, sink| {
+                for k in range {
+                    let i = if k < held { cells.entries[k].class } else { tree.members[k - held] };
+                    sink.with_list(boxes, &boxes.unbounded, i);
+                    if k < held {
+                        let candidates = partners(grid, cells, k, sink);
+                        sink.took(candidates);
+                        let turns = tree.partners_of(boxes, i, traversal, sink);
+                        sink.took(turns);
+                    } else {
+                        let turns = tree.partners_after(k - held, boxes, traversal, sink);
+                        sink.took(turns);
+                    }
+                }
+            })
+        }
     }
-    Found { pairs, count: count.into_inner(), most_candidates }
 }
 
-/// Appends the partners of `i` that have a higher index, in order; returns how many candidates its cells held.
-fn partners(grid: &Grid, cells: &Cells, aabbs: &[Aabb], i: u32, pairs: &mut Vec<[u32; 2]>) -> u32 {
-    let own = &aabbs[i as usize];
-    if own.body & aabb_body::LIVE == 0 {
-        return 0;
-    }
-    let first = pairs.len();
+/// Pairs of entry `k` with those behind it in its own cell and those of the cells ahead; returns how many there were to
+/// look at.
+fn partners(grid: &Grid, cells: &Cells, k: usize, sink: &mut Sink) -> u32 {
+    let own = &cells.entries[k];
+    let cell = grid.cell(own);
     let mut candidates = 0;
-    let mut offer = |j: u32| {
-        if j > i && meets(own, &aabbs[j as usize]) {
-            pairs.push([i, j]);
+    let mut visit = |range: Range<usize>| {
+        candidates += range.len() as u32;
+        for other in &cells.entries[range] {
+            if overlaps(own.min, own.max, other.min, other.max) && matter(own.body, other.body) {
+                sink.push(own.class, other.class);
+            }
         }
     };
-    cells.large.iter().for_each(|&j| offer(j));
-    if grid.holds(own) {
-        let [x, y, z] = grid.cell(own);
-        for neighbour in 0..27 {
-            let cell = [x + neighbour % 3 - 1, y + neighbour / 3 % 3 - 1, z + neighbour / 9 - 1];
-            let index = grid.index(cell);
-            let range = cells.start[index] as usize..cells.start[index + 1] as usize;
-            candidates += range.len() as u32;
-            if candidates <= CELL_LOOP_LIMIT {
-                cells.entries[range].iter().for_each(|&j| offer(j));
-            }
+    visit(k + 1..cells.start[grid.index(cell) + 1] as usize);
+    grid.ahead(cell, |range| {
+        if !range.is_empty() {
+            visit(cells.start[range.start] as usize..cells.start[range.end] as usize);
         }
-    } else {
-        ((i + 1)..aabbs.len() as u32).filter(|&j| grid.holds(&aabbs[j as usize])).for_each(&mut offer);
-    }
-    pairs[first..].sort_unstable();
+    });
     candidates
-}
-
-/// How many candidates, or colliders outside the grid, there are where a shader's loop over them would come near its
-/// bound; nothing where none does.
-pub fn too_crowded(found: &Found, cells: &Cells) -> Option<u32> {
-    let large = cells.large.len() as u32;
-    let candidates = (found.most_candidates > CELL_LOOP_LIMIT).then_some(found.most_candidates);
-    candidates.max((large > LARGE_LOOP_LIMIT).then_some(large))
 }

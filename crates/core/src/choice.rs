@@ -1,0 +1,80 @@
+//! Which broad phase suits a scene.
+
+use crate::limits::large_limit;
+use crate::params::Broadphase;
+use crate::scene::Scene;
+use crate::shape::Shape;
+use glam::Vec3;
+
+/// What the choice rests on: shapes, and places as they were at insertion. Half-spaces do not count.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Spread {
+    /// All colliders.
+    pub all: u32,
+    /// Those that have an end.
+    pub colliders: u32,
+    /// Size of the largest collider over that of the median one, when the few that a grid may leave out are left out.
+    pub size_ratio: f32,
+    /// Longest axis of the scene over the second, both at least one median collider.
+    pub elongation: f32,
+    /// Cells of the median size in the box around all, for each collider.
+    pub sparsity: f32,
+}
+
+impl Spread {
+    /// Of a scene.
+    pub fn of(scene: &Scene) -> Self {
+        let mut sizes = Vec::with_capacity(scene.collider_count());
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for (_, _, collider) in scene.colliders.iter() {
+            sizes.push(match collider.builder.shape {
+                Shape::Ball { radius } => 2.0 * radius,
+                Shape::Cuboid { half_extents } => 2.0 * half_extents.max_element(),
+                Shape::HalfSpace { .. } => continue,
+            });
+            if let Ok(body) = scene.body(collider.body) {
+                let middle = body.translation + body.rotation * collider.builder.translation;
+                (low, high) = (low.min(middle), high.max(middle));
+            }
+        }
+        Self { all: scene.collider_count() as u32, ..Self::from_sizes(sizes, high - low) }
+    }
+
+    /// Of colliders of these sizes whose middles fill a box of this extent.
+    pub fn from_sizes(mut sizes: Vec<f32>, extent: Vec3) -> Self {
+        let count = sizes.len();
+        if count == 0 {
+            return Self::default();
+        }
+        let mut nth = |n: usize| *sizes.select_nth_unstable_by(n, f32::total_cmp).1;
+        let median = nth(count / 2).max(f32::MIN_POSITIVE);
+        let largest = nth(count - 1 - (large_limit(count as u32, false) as usize).min(count - 1));
+        let cells = (extent.max(Vec3::ZERO) / median).max(Vec3::ONE);
+        let mut axes = cells.to_array();
+        axes.sort_by(f32::total_cmp);
+        Self {
+            all: count as u32,
+            colliders: count as u32,
+            size_ratio: largest / median,
+            elongation: axes[2] / axes[1],
+            sparsity: axes[0] * axes[1] * axes[2] / count as f32,
+        }
+    }
+
+    /// Whether so many sizes differ so much that a grid needs a tree beside it.
+    pub fn is_wide(&self) -> bool {
+        self.size_ratio > 4.0
+    }
+}
+
+impl Broadphase {
+    /// What `Auto` stands for in a scene like this; anything else stands for itself.
+    pub fn resolve(self, spread: &Spread) -> Self {
+        match self {
+            Self::Auto if spread.colliders <= 64 => Self::BruteForce,
+            Self::Auto if spread.is_wide() => Self::Lbvh,
+            Self::Auto => Self::Grid,
+            named => named,
+        }
+    }
+}

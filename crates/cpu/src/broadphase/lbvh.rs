@@ -1,0 +1,426 @@
+//! Stage `broadphase/lbvh`: linear bounding volume hierarchy. Twin of `shaders/broadphase/lbvh.wgsl`.
+//!
+//! Colliders are sorted along a Morton curve by the middles of their boxes, and the common prefixes of the codes make the
+//! hierarchy, each node by itself: Karras, "Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees"
+//! (HPG 2012); equal codes are told apart by their places. Every node covers a run of leaves, so its box is a union of
+//! powers of two of them, which a pyramid over the leaves has ready: no node waits for another.
+//!
+//! A walk needs no stack: each node knows where it escapes to. That is the right child where its run ends at a split, as
+//! in Prokopenko and Lebrun-Grandié, "Revising Apetrei's bounding volume hierarchy construction algorithm to allow
+//! stackless traversal" (2024); and a leaf that begins at its own escape finds each pair once. Two other ways of walking
+//! are here to compare: history flags (Harada, GDC 2009) and a short stack.
+
+use super::{Boxes, Found, Sink, bounded, center, collect, matter, overlaps};
+use crate::bounds::FAR;
+use bytemuck::Zeroable;
+use rayon::prelude::*;
+use tumble_core::layout::{Aabb, NO_NODE, TreeNode, aabb_body, root_of, tree_members};
+use tumble_core::limits::TURN_LIMIT;
+use tumble_core::{MortonBits, Traversal};
+
+/// Nodes that a walk with a stack keeps; where there is no room for one, its subtree is walked by escapes.
+const STACK: usize = 24;
+
+/// A tree over some of the colliders.
+#[derive(Debug, Clone, Default)]
+pub struct Tree {
+    /// Codes of the leaves, rising.
+    pub codes: Vec<u64>,
+    /// Colliders of the leaves.
+    pub members: Vec<u32>,
+    /// Leaf p is node 2 p, internal node i is node 2 i + 1.
+    pub nodes: Vec<TreeNode>,
+    /// The leaf at the other end of internal node i's run, of which leaf i is one end.
+    pub ends: Vec<u32>,
+    /// Parent of each node, where a walk needs it.
+    pub parents: Vec<u32>,
+    /// Boxes of 2, 4, 8, ... leaves from a multiple of so many on, level after level.
+    pyramid: Vec<Vec<Corners>>,
+}
+
+/// Lower and upper corner.
+type Corners = [[f32; 3]; 2];
+
+const NOTHING: Corners = [[FAR; 3], [-FAR; 3]];
+
+fn union(a: Corners, b: Corners) -> Corners {
+    [std::array::from_fn(|i| a[0][i].min(b[0][i])), std::array::from_fn(|i| a[1][i].max(b[1][i]))]
+}
+
+/// Whether a collider belongs to the tree of moving or of fixed ones.
+pub fn is_member(aabb: &Aabb, members: u32) -> bool {
+    bounded(aabb) && (aabb.body & aabb_body::FIXED != 0) == (members == tree_members::FIXED)
+}
+
+/// Turns middles into codes: lowest middle, and codes per metre, a power of two, so that the factor is exact everywhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quantizer {
+    /// Lowest middle, m.
+    pub low: [f32; 3],
+    /// 1/m.
+    pub scale: f32,
+    /// Bits an axis.
+    pub bits: u32,
+}
+
+impl Quantizer {
+    /// For all bounded colliders.
+    pub fn new(boxes: &Boxes, bits: MortonBits) -> Self {
+        let bits = if bits == MortonBits::Bits63 { 21 } else { 10 };
+        let extent = (0..3).map(|i| boxes.high[i] - boxes.low[i]).fold(0.0, f32::max);
+        // The next power of two above the extent goes to the number of cells.
+        let exponent = (extent.to_bits() >> 23).clamp(64, 190);
+        let scale = f32::from_bits((127 + bits + 126 - exponent) << 23);
+        Self { low: boxes.low, scale, bits }
+    }
+
+    /// Code of a box: x lowest, the most significant bits first.
+    pub fn code(&self, aabb: &Aabb) -> u64 {
+        let middle = center(aabb);
+        let most = (1u32 << self.bits) - 1;
+        let [x, y, z] =
+            std::array::from_fn(|i| ((middle[i] - self.low[i]) * self.scale).clamp(0.0, most as f32) as u32);
+        spread(x) | spread(y) << 1 | spread(z) << 2
+    }
+}
+
+/// The lowest 21 bits, each three places from the last.
+fn spread(x: u32) -> u64 {
+    let mut x = u64::from(x);
+    x = (x | x << 32) & 0x001f_0000_0000_ffff;
+    x = (x | x << 16) & 0x001f_0000_ff00_00ff;
+    x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
+    x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
+    (x | x << 2) & 0x1249_2492_4924_9249
+}
+
+/// Length of the prefix that the codes of two leaves share, places included; -1 where there is no leaf `b`.
+fn shared(codes: &[u64], a: usize, b: i64) -> i32 {
+    if b < 0 || b >= codes.len() as i64 {
+        return -1;
+    }
+    let different = codes[a] ^ codes[b as usize];
+    match different {
+        0 => 64 + (a as u32 ^ b as u32).leading_zeros() as i32,
+        _ => different.leading_zeros() as i32,
+    }
+}
+
+impl Tree {
+    /// A tree of all bounded colliders that are fixed, or of those that are not.
+    pub fn new(boxes: &Boxes, bits: MortonBits, members: u32) -> Self {
+        let list: Vec<u32> =
+            (0..boxes.aabbs.len() as u32).filter(|&i| is_member(&boxes.aabbs[i as usize], members)).collect();
+        Self::of_members(boxes, &list, bits)
+    }
+
+    /// A tree of these colliders.
+    pub fn of_members(boxes: &Boxes, list: &[u32], bits: MortonBits) -> Self {
+        let mut tree = Self::default();
+        let quantizer = Quantizer::new(boxes, bits);
+        let mut keys: Vec<(u64, u32)> =
+            list.par_iter().map(|&i| (quantizer.code(&boxes.aabbs[i as usize]), i)).collect();
+        keys.par_sort();
+        tree.codes = keys.iter().map(|key| key.0).collect();
+        tree.members = keys.iter().map(|key| key.1).collect();
+        tree.link();
+        tree.refit(boxes);
+        tree
+    }
+
+    /// Leaves.
+    pub fn count(&self) -> u32 {
+        self.members.len() as u32
+    }
+
+    /// Children, runs and escapes of all nodes.
+    fn link(&mut self) {
+        let count = self.members.len();
+        let codes = &self.codes;
+        let internal: Vec<(u32, u32, u32)> =
+            (0..count.saturating_sub(1)).into_par_iter().with_min_len(512).map(|i| internal_node(codes, i)).collect();
+        self.nodes = vec![TreeNode::zeroed(); 2 * count];
+        self.nodes.par_chunks_mut(2).with_min_len(512).enumerate().for_each(|(i, two)| {
+            two[0].child = self.members[i];
+            two[0].escape = escape(codes, i);
+            if let Some((left, _, last)) = internal.get(i) {
+                two[1].child = *left;
+                two[1].escape = escape(codes, *last as usize);
+            }
+        });
+        self.ends = internal.iter().map(|node| node.1).collect();
+    }
+
+    /// Parents of all nodes, for a walk by history flags.
+    pub fn link_parents(&mut self) {
+        self.parents = vec![NO_NODE; self.nodes.len()];
+        for i in 0..self.ends.len() {
+            let left = self.nodes[2 * i + 1].child;
+            let right = self.nodes[left as usize].escape;
+            self.parents[left as usize] = 2 * i as u32 + 1;
+            self.parents[right as usize] = 2 * i as u32 + 1;
+        }
+    }
+
+    /// Boxes of all nodes, from those that the colliders have now. A collider that is gone has an empty one.
+    pub fn refit(&mut self, boxes: &Boxes) {
+        let count = self.members.len();
+        let leaves: Vec<Corners> = self.members.par_iter().with_min_len(512).map(|&i| corners(boxes, i)).collect();
+        self.pyramid = pyramid(leaves);
+        let (ends, pyramid) = (&self.ends, &self.pyramid);
+        self.nodes.par_chunks_mut(2).with_min_len(512).enumerate().for_each(|(i, two)| {
+            [two[0].min, two[0].max] = pyramid[0][i];
+            if i + 1 < count {
+                let end = ends[i] as usize;
+                [two[1].min, two[1].max] = covered(pyramid, i.min(end), i.max(end));
+            }
+        });
+    }
+
+    /// Pairs of leaf `leaf` with those after it; returns the turns that it took.
+    pub(super) fn partners_after(&self, leaf: usize, boxes: &Boxes, traversal: Traversal, sink: &mut Sink) -> u32 {
+        let i = self.members[leaf];
+        let own = &boxes.aabbs[i as usize];
+        let mut offer = |j: u32| {
+            if matter(own.body, boxes.aabbs[j as usize].body) {
+                sink.push(i, j);
+            }
+        };
+        let first = self.nodes[2 * leaf].escape;
+        if traversal == Traversal::Escape {
+            return self.walk_by_escapes(first, NO_NODE, own, &mut offer);
+        }
+        // What hangs to the right of the way from the leaf to the root, from the leaf up.
+        let (mut top, mut turns) = (first, 0);
+        while top != NO_NODE && turns <= TURN_LIMIT {
+            turns += self.walk(top, own, traversal, &mut offer);
+            top = self.nodes[top as usize].escape;
+        }
+        turns
+    }
+
+    /// Pairs of collider `i`, which is not in the tree, with all leaves; returns the turns that it took.
+    pub(super) fn partners_of(&self, boxes: &Boxes, i: u32, traversal: Traversal, sink: &mut Sink) -> u32 {
+        let own = &boxes.aabbs[i as usize];
+        self.walk(root_of(self.count()), own, traversal, &mut |j| {
+            if matter(own.body, boxes.aabbs[j as usize].body) {
+                sink.push(i, j);
+            }
+        })
+    }
+
+    /// Offers the colliders of all leaves below node `top` whose boxes overlap `own`; returns the turns that it took.
+    fn walk(&self, top: u32, own: &Aabb, traversal: Traversal, offer: &mut impl FnMut(u32)) -> u32 {
+        if top == NO_NODE {
+            return 0;
+        }
+        match traversal {
+            Traversal::History => self.walk_by_history(top, own, offer),
+            Traversal::Stack => self.walk_with_stack(top, own, offer),
+            _ => self.walk_by_escapes(top, self.nodes[top as usize].escape, own, offer),
+        }
+    }
+
+    /// From node `top` until node `end` comes.
+    fn walk_by_escapes(&self, top: u32, end: u32, own: &Aabb, offer: &mut impl FnMut(u32)) -> u32 {
+        let (mut next, mut turns) = (top, 0);
+        while next != end && turns <= TURN_LIMIT {
+            turns += 1;
+            let node = &self.nodes[next as usize];
+            if !overlaps(own.min, own.max, node.min, node.max) {
+                next = node.escape;
+            } else if next % 2 == 0 {
+                offer(node.child);
+                next = node.escape;
+            } else {
+                next = node.child;
+            }
+        }
+        turns
+    }
+
+    /// Bit k of `pending` tells that the right child at level k below `top` is still to be seen.
+    fn walk_by_history(&self, top: u32, own: &Aabb, offer: &mut impl FnMut(u32)) -> u32 {
+        let (mut next, mut level, mut pending, mut turns) = (top, 0u32, 0u128, 1);
+        if !self.enters(top, own) {
+            return turns;
+        }
+        while turns <= TURN_LIMIT {
+            turns += 1;
+            if next % 2 == 0 {
+                offer(self.nodes[next as usize].child);
+            } else {
+                let left = self.nodes[next as usize].child;
+                let right = self.nodes[left as usize].escape;
+                let (to_left, to_right) = (self.enters(left, own), self.enters(right, own));
+                if to_left || to_right {
+                    level += 1;
+                    pending |= u128::from(to_left && to_right) << level;
+                    next = if to_left { left } else { right };
+                    continue;
+                }
+            }
+            while level > 0 && pending >> level & 1 == 0 {
+                turns += 1;
+                level -= 1;
+                next = self.parents[next as usize];
+            }
+            if level == 0 {
+                break;
+            }
+            pending &= !(1 << level);
+            next = self.nodes[next as usize].escape;
+        }
+        turns
+    }
+
+    fn walk_with_stack(&self, top: u32, own: &Aabb, offer: &mut impl FnMut(u32)) -> u32 {
+        let (mut next, mut stack, mut depth, mut turns) = (top, [0u32; STACK], 0, 1);
+        if !self.enters(top, own) {
+            return turns;
+        }
+        while turns <= TURN_LIMIT {
+            turns += 1;
+            let node = &self.nodes[next as usize];
+            if next % 2 == 0 {
+                offer(node.child);
+            } else {
+                let left = node.child;
+                let right = self.nodes[left as usize].escape;
+                match (self.enters(left, own), self.enters(right, own)) {
+                    (true, true) if depth == STACK => turns += self.walk_by_escapes(left, node.escape, own, offer),
+                    (true, true) => {
+                        stack[depth] = right;
+                        depth += 1;
+                        next = left;
+                        continue;
+                    }
+                    (true, false) => {
+                        next = left;
+                        continue;
+                    }
+                    (false, true) => {
+                        next = right;
+                        continue;
+                    }
+                    (false, false) => {}
+                }
+            }
+            if depth == 0 {
+                break;
+            }
+            depth -= 1;
+            next = stack[depth];
+        }
+        turns
+    }
+
+    fn enters(&self, node: u32, own: &Aabb) -> bool {
+        let node = &self.nodes[node as usize];
+        overlaps(own.min, own.max, node.min, node.max)
+    }
+
+    /// Panics unless the tree is one, over these boxes, with codes that rise.
+    pub fn assert_well_formed(&self, boxes: &Boxes) {
+        assert!(self.codes.is_sorted(), "codes rise");
+        let leaf_box = |i: u32| corners(boxes, i);
+        tumble_core::validate::tree(&self.nodes, self.count(), leaf_box).unwrap_or_else(|error| panic!("{error}"));
+    }
+}
+
+fn corners(boxes: &Boxes, i: u32) -> Corners {
+    let aabb = &boxes.aabbs[i as usize];
+    [aabb.min, aabb.max]
+}
+
+/// Left child of internal node i, the other end of its run, and the run's last leaf.
+fn internal_node(codes: &[u64], i: usize) -> (u32, u32, u32) {
+    let here = i as i64;
+    let prefix = |j: i64| shared(codes, i, j);
+    // The run goes to the side of the neighbour that shares more, as far as more is shared than with the other one.
+    let way = if prefix(here + 1) > prefix(here - 1) { 1 } else { -1 };
+    let least = prefix(here - way);
+    let mut reach = 2;
+    while prefix(here + reach * way) > least {
+        reach *= 2;
+    }
+    let mut length = 0;
+    let mut stride = reach / 2;
+    while stride > 0 {
+        if prefix(here + (length + stride) * way) > least {
+            length += stride;
+        }
+        stride /= 2;
+    }
+    let end = here + length * way;
+    // It splits where the prefix of all ends.
+    let common = prefix(end);
+    let mut split = 0;
+    stride = length;
+    while stride > 1 {
+        stride = (stride + 1) / 2;
+        if prefix(here + (split + stride) * way) > common {
+            split += stride;
+        }
+    }
+    let split = here + split * way + way.min(0);
+    let first = here.min(end);
+    let left = 2 * split + i64::from(split != first);
+    (left as u32, end as u32, here.max(end) as u32)
+}
+
+/// Where a walk goes on after a run that ends with leaf `last`: the right child of the node that splits there, which is a
+/// leaf where it is alone.
+fn escape(codes: &[u64], last: usize) -> u32 {
+    if last + 1 >= codes.len() {
+        return NO_NODE;
+    }
+    let next = last as i64 + 1;
+    let alone = shared(codes, last + 1, next + 1) <= shared(codes, last + 1, next - 1);
+    2 * next as u32 + u32::from(!alone)
+}
+
+/// Boxes of runs of 1, 2, 4, ... leaves that begin at multiples of their length.
+fn pyramid(leaves: Vec<Corners>) -> Vec<Vec<Corners>> {
+    let mut levels = vec![leaves];
+    while let Some(below) = levels.last().filter(|level| level.len() > 1) {
+        let pair = |two: &[Corners]| union(two[0], two[1]);
+        levels.push(below.par_chunks_exact(2).with_min_len(2048).map(pair).collect());
+    }
+    levels
+}
+
+/// Box of the leaves from `first` to `last`.
+fn covered(pyramid: &[Vec<Corners>], first: usize, last: usize) -> Corners {
+    let (mut from, mut to, mut sum) = (first, last + 1, NOTHING);
+    for level in pyramid {
+        if from >= to {
+            break;
+        }
+        if from % 2 == 1 {
+            sum = union(sum, level[from]);
+            from += 1;
+        }
+        if to % 2 == 1 {
+            to -= 1;
+            sum = union(sum, level[to]);
+        }
+        (from, to) = (from / 2, to / 2);
+    }
+    sum
+}
+
+/// All pairs, from a tree of what moves and one of what is fixed, both refitted; beyond `most` they are counted and not
+/// kept. Trees walked by history need their parents.
+pub fn find_pairs(moving: &Tree, fixed: &Tree, boxes: &Boxes, traversal: Traversal, most: u32) -> Found {
+    collect(boxes, &boxes.unbounded, moving.members.len(), most, |range, sink| {
+        for leaf in range {
+            let i = moving.members[leaf];
+            sink.with_list(boxes, &boxes.unbounded, i);
+            let turns = moving.partners_after(leaf, boxes, traversal, sink);
+            sink.took(turns);
+            let turns = fixed.partners_of(boxes, i, traversal, sink);
+            sink.took(turns);
+        }
+    })
+}
