@@ -18,6 +18,7 @@ const LAYOUTS: &[&str] = &[
     "shared/manifold",
     "shared/pair",
     "shared/step",
+    "shared/tree",
 ];
 
 /// Fields whose Rust name WGSL keeps for itself: (struct, Rust, WGSL).

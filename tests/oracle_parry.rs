@@ -14,7 +14,8 @@ use tumble_core::glam::{DVec3, Quat, Vec3};
 use tumble_core::layout::*;
 use tumble_core::measures::{DPose, cuboid_cuboid_separation};
 use tumble_core::{ColliderBuilder, PackedScene, Params, RigidBodyBuilder, Scene, limits, scenes};
-use tumble_cpu::broadphase::grid;
+use tumble_cpu::broadphase::Boxes;
+use tumble_cpu::broadphase::grid::{self, Large};
 use tumble_cpu::contact::kind_of;
 use tumble_cpu::{bounds, narrowphase};
 
@@ -100,7 +101,7 @@ impl Packed {
         let mut step = Params::default().step_params(1, scene.gravity);
         (step.body_count, step.collider_count) = (scene.states.len() as u32, scene.colliders.len() as u32);
         step.cell_table_bits = limits::cell_table_bits(step.collider_count);
-        step.large_limit = limits::large_limit(step.collider_count);
+        step.large_limit = limits::large_limit(step.collider_count, false);
         let box_of = |c: &Collider| {
             bounds::collider_bounds(c, &scene.states[c.body as usize], &scene.props[c.body as usize], &step)
         };
@@ -109,8 +110,9 @@ impl Packed {
     }
 
     fn grid_pairs(&self) -> Vec<[u32; 2]> {
-        let grid = grid::choose(&self.boxes, &self.step);
-        grid::find_pairs(&grid, &grid::fill(&grid, &self.boxes, &self.step), &self.boxes).pairs
+        let boxes = Boxes::new(&self.boxes);
+        let grid = grid::choose(&boxes, &self.step);
+        grid::find_pairs(&grid, &grid::fill(&grid, &boxes, &self.step), &boxes, Large::List, u32::MAX).pairs
     }
 
     /// Every pair of colliders of different bodies, one of them dynamic, that `meets`.

@@ -280,7 +280,7 @@ fn pair_count(
     if atomicLoad(&counters[CONTROL_STOP]) == 0u {
         found = partners(i, decided_in_counters(), atomicLoad(&counters[CONTROL_LARGE_COUNT]), 0u, false);
         if found.candidates > CELL_LOOP_LIMIT {
-            atomicMax(&counters[CONTROL_OVERFLOW], OVERFLOW_CELL);
+            atomicMax(&counters[CONTROL_OVERFLOW], OVERFLOW_TURNS);
             atomicMax(&counters[CONTROL_NEEDED], found.candidates);
         }
     }
@@ -296,7 +296,7 @@ fn gate(@builtin(local_invocation_index) lid: u32) {
         let pairs = atomicLoad(&counters[CONTROL_PAIR_COUNT]);
         let large = atomicLoad(&counters[CONTROL_LARGE_COUNT]);
         if large > LARGE_LOOP_LIMIT {
-            atomicMax(&counters[CONTROL_OVERFLOW], OVERFLOW_CELL);
+            atomicMax(&counters[CONTROL_OVERFLOW], OVERFLOW_TURNS);
             atomicMax(&counters[CONTROL_NEEDED], large);
         }
         if atomicLoad(&counters[CONTROL_OVERFLOW]) != OVERFLOW_NONE {

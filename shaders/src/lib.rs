@@ -38,6 +38,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/recycle", include_str!("../shared/recycle.wgsl")),
     ("shared/step", include_str!("../shared/step.wgsl")),
     ("shared/thread", include_str!("../shared/thread.wgsl")),
+    ("shared/tree", include_str!("../shared/tree.wgsl")),
     ("shared/workgroup", include_str!("../shared/workgroup.wgsl")),
     ("solver/passes", include_str!("../solver/passes.wgsl")),
     ("solver/prepare", include_str!("../solver/prepare.wgsl")),

@@ -8,7 +8,7 @@ use tumble_core::glam::Vec3;
 use tumble_core::layout::*;
 use tumble_core::{PackedScene, Params, Scene, limits, scenes};
 use tumble_cpu::batch::{self, Batches, Ends};
-use tumble_cpu::broadphase::grid;
+use tumble_cpu::broadphase::{Boxes, brute_force};
 use tumble_cpu::contact::{self, Matched, NO_FEATURE};
 use tumble_cpu::solver::prepare::{Contact, prepare_body, prepare_constraint};
 use tumble_cpu::solver::{Bodies, PlainRows, solve_plain, store};
@@ -113,7 +113,7 @@ impl Cpu {
         step.body_count = self.states.len() as u32;
         step.collider_count = self.colliders.len() as u32;
         step.cell_table_bits = limits::cell_table_bits(step.collider_count);
-        step.large_limit = limits::large_limit(step.collider_count);
+        step.large_limit = limits::large_limit(step.collider_count, false);
         step.pair_capacity = self.batch_of_slot.len() as u32;
         step.wide_batches = 8;
         let mut states = self.states.clone();
@@ -127,8 +127,7 @@ impl Cpu {
             .iter()
             .map(|c| bounds::collider_bounds(c, &states[c.body as usize], &self.props[c.body as usize], &step))
             .collect();
-        let grid = grid::choose(&aabbs, &step);
-        let found = grid::find_pairs(&grid, &grid::fill(&grid, &aabbs, &step), &aabbs);
+        let found = brute_force::find_pairs(&Boxes::new(&aabbs), u32::MAX);
         let matched = contact::match_pairs(&self.pairs, &found.pairs, &self.colliders, &self.free, step.step);
         let collide =
             |pair: &Pair| narrowphase::collide(pair, &self.colliders, &states, &self.found[pair.slot as usize], &step);

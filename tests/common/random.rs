@@ -142,6 +142,6 @@ pub(crate) fn step_of(bodies: u32) -> StepParams {
     let mut step = Params::default().step_params(7, Vec3::new(0.3, -9.81, 0.1));
     (step.body_count, step.collider_count) = (bodies, bodies);
     step.cell_table_bits = tumble_core::limits::cell_table_bits(bodies);
-    step.large_limit = tumble_core::limits::large_limit(bodies);
+    step.large_limit = tumble_core::limits::large_limit(bodies, false);
     step
 }

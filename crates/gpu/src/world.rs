@@ -195,7 +195,7 @@ impl World {
         step.collider_count = colliders;
         step.edit_ranges = edits.ranges.len() as u32;
         step.cell_table_bits = limits::cell_table_bits(colliders);
-        step.large_limit = limits::large_limit(colliders);
+        step.large_limit = limits::large_limit(colliders, false);
         step.drop_pair = std::mem::replace(&mut self.drop_pair, u32::MAX);
         self.submitted += 1;
         self.submit(Record { step, edits, plan: self.editor.plan() })
@@ -367,7 +367,8 @@ impl World {
         let (buffer, capacity) = match self.last.overflow {
             overflow::PAIRS => ("pairs", self.sizes.pairs),
             overflow::LAST_BATCH => ("last batch", limits::LAST_LIMIT),
-            _ => ("cell", limits::CELL_LOOP_LIMIT),
+            overflow::UNBOUNDED => ("half-spaces", limits::UNBOUNDED_LIMIT),
+            _ => ("partners", limits::TURN_LIMIT),
         };
         let error = Error::Capacity { buffer, needed, capacity: capacity.into() };
         if buffer != "pairs" {
