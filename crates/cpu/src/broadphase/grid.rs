@@ -293,6 +293,11 @@ pub fn fill(grid: &Grid, boxes: &Boxes, step: &StepParams) -> Cells {
 }
 
 impl Cells {
+    /// Bytes of all arrays.
+    pub fn bytes(&self) -> u64 {
+        (4 * self.start.len() + size_of::<Aabb>() * self.entries.len() + 4 * self.large.len()) as u64
+    }
+
     /// Panics unless every collider of the grid stands once, in its own cell, and the others are large ones.
     pub fn assert_well_formed(&self, grid: &Grid, boxes: &Boxes) {
         let cell_of = |i: u32| match &boxes.aabbs[i as usize] {

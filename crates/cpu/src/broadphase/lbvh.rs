@@ -133,6 +133,14 @@ impl Tree {
         self.members.len() as u32
     }
 
+    /// Bytes of all arrays.
+    pub fn bytes(&self) -> u64 {
+        let pyramid: usize = self.pyramid.iter().map(Vec::len).sum();
+        let words = self.members.len() + self.ends.len() + self.parents.len();
+        (8 * self.codes.len() + 4 * words + size_of::<TreeNode>() * self.nodes.len() + size_of::<Corners>() * pyramid)
+            as u64
+    }
+
     /// Children, runs and escapes of all nodes.
     fn link(&mut self) {
         let count = self.members.len();
