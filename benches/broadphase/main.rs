@@ -4,7 +4,7 @@
 //! All get the same boxes and take turns, so that a noisy machine harms all alike; times are medians, and pair counts are
 //! compared. *Fresh*: everything is built anew. *Steady*: bodies fly on by a step, and what can be kept is.
 //! `--quick` runs a little of everything, as a test; `--out DIR` writes `broadphase.csv` and a picture;
-//! `--no-gpu` leaves the GPU out.
+//! `--no-gpu` leaves the GPU out; `--most N` leaves larger crowds out, `--only NAME` those of other names.
 
 #[path = "../../tests/common/cloud.rs"]
 mod cloud;
@@ -75,14 +75,15 @@ fn median(times: impl Iterator<Item = f64>) -> f64 {
 /// Name, and what runs once more.
 type Contestant<'a> = (&'static str, Box<dyn FnMut() -> Sample + 'a>);
 
-/// All take turns; the first run of each is not counted.
+/// All take turns; the first run of each is not counted. Those far behind run once more only.
 fn contest(kind: Crowd, count: usize, rounds: usize, mut contestants: Vec<Contestant>) -> Vec<Row> {
+    let first: Vec<f64> = contestants.iter_mut().map(|(_, run)| run()).map(|s| s.build + s.pairs).collect();
+    let fastest = first.iter().copied().fold(f64::INFINITY, f64::min);
     let mut samples = vec![Vec::new(); contestants.len()];
-    for round in 0..=rounds {
-        for ((_, run), samples) in contestants.iter_mut().zip(&mut samples) {
-            let sample = run();
-            if round > 0 || rounds == 0 {
-                samples.push(sample);
+    for round in 0..rounds {
+        for (i, (_, run)) in contestants.iter_mut().enumerate() {
+            if round == 0 || first[i] < 6.0 * fastest {
+                samples[i].push(run());
             }
         }
     }
@@ -205,12 +206,14 @@ struct Settings {
     threads: usize,
     quick: bool,
     most: usize,
+    /// Crowds whose names begin so.
+    only: String,
 }
 
 impl Settings {
     /// Enough rounds to take a median of, and no more time than a coffee.
     fn rounds(&self, count: usize) -> usize {
-        if self.quick { 1 } else { (1_500_000 / count.max(1)).clamp(3, 25) }
+        if self.quick { 1 } else { (900_000 / count.max(1)).clamp(3, 25) }
     }
 }
 
@@ -242,7 +245,9 @@ fn on_cpu(settings: &Settings) -> (Vec<Row>, Vec<Row>, Vec<Choice>) {
     let others = [Crowd::Clustered, Crowd::Line, Crowd::Plane, Crowd::Fast, Crowd::Far, Crowd::Liu];
     cases.extend(others.map(|kind| (kind, 100 * thousand)));
     cases.extend([(Crowd::OnePoint, thousand), (Crowd::Ratio(10.0), thousand), (Crowd::Ratio(1000.0), 10 * thousand)]);
-    for (kind, count) in cases.into_iter().filter(|(_, count)| *count <= settings.most) {
+    let wanted =
+        |(kind, count): &(Crowd, usize)| *count <= settings.most && kind.to_string().starts_with(&settings.only);
+    for (kind, count) in cases.into_iter().filter(wanted) {
         let scene = crowd(kind, count);
         let mut cloud = Cloud::new(&scene);
         let aabbs = cloud.boxes();
@@ -291,7 +296,8 @@ fn main() {
     let value = |flag: &str| arguments.iter().position(|a| a == flag).and_then(|at| arguments.get(at + 1));
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     let most = value("--most").map_or(usize::MAX, |n| n.parse().expect("--most wants a number of bodies"));
-    let settings = Settings { threads, quick: has("--quick"), most };
+    let only = value("--only").cloned().unwrap_or_default();
+    let settings = Settings { threads, quick: has("--quick"), most, only };
     println!("{} threads, ours and theirs", settings.threads);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(settings.threads).build().expect("threads start");
     let (fresh, steady, choices) = pool.install(|| on_cpu(&settings));

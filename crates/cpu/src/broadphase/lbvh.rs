@@ -10,7 +10,7 @@
 //! stackless traversal" (2024); and a leaf that begins at its own escape finds each pair once. Two other ways of walking
 //! are here to compare: history flags (Harada, GDC 2009) and a short stack.
 
-use super::{Boxes, Found, Sink, bounded, center, collect, matter, overlaps};
+use super::{Boxes, Found, Query, Sink, bounded, center, collect, matter};
 use crate::bounds::FAR;
 use bytemuck::Zeroable;
 use rayon::prelude::*;
@@ -231,18 +231,17 @@ impl Tree {
 
     /// From node `top` until node `end` comes.
     fn walk_by_escapes(&self, top: u32, end: u32, own: &Aabb, offer: &mut impl FnMut(u32)) -> u32 {
+        let query = Query::new(own);
         let (mut next, mut turns) = (top, 0);
         while next != end && turns <= TURN_LIMIT {
             turns += 1;
             let node = &self.nodes[next as usize];
-            if !overlaps(own.min, own.max, node.min, node.max) {
-                next = node.escape;
-            } else if next % 2 == 0 {
+            let (enters, leaf) = (query.overlaps(node), next % 2 == 0);
+            if enters & leaf {
                 offer(node.child);
-                next = node.escape;
-            } else {
-                next = node.child;
             }
+            // A choice of values and not of ways, which nobody could foretell.
+            next = if enters & !leaf { node.child } else { node.escape };
         }
         turns
     }
@@ -250,7 +249,8 @@ impl Tree {
     /// Bit k of `pending` tells that the right child at level k below `top` is still to be seen.
     fn walk_by_history(&self, top: u32, own: &Aabb, offer: &mut impl FnMut(u32)) -> u32 {
         let (mut next, mut level, mut pending, mut turns) = (top, 0u32, 0u128, 1);
-        if !self.enters(top, own) {
+        let query = Query::new(own);
+        if !self.enters(top, &query) {
             return turns;
         }
         while turns <= TURN_LIMIT {
@@ -260,7 +260,7 @@ impl Tree {
             } else {
                 let left = self.nodes[next as usize].child;
                 let right = self.nodes[left as usize].escape;
-                let (to_left, to_right) = (self.enters(left, own), self.enters(right, own));
+                let (to_left, to_right) = (self.enters(left, &query), self.enters(right, &query));
                 if to_left || to_right {
                     level += 1;
                     pending |= u128::from(to_left && to_right) << level;
@@ -284,7 +284,8 @@ impl Tree {
 
     fn walk_with_stack(&self, top: u32, own: &Aabb, offer: &mut impl FnMut(u32)) -> u32 {
         let (mut next, mut stack, mut depth, mut turns) = (top, [0u32; STACK], 0, 1);
-        if !self.enters(top, own) {
+        let query = Query::new(own);
+        if !self.enters(top, &query) {
             return turns;
         }
         while turns <= TURN_LIMIT {
@@ -295,7 +296,7 @@ impl Tree {
             } else {
                 let left = node.child;
                 let right = self.nodes[left as usize].escape;
-                match (self.enters(left, own), self.enters(right, own)) {
+                match (self.enters(left, &query), self.enters(right, &query)) {
                     (true, true) if depth == STACK => turns += self.walk_by_escapes(left, node.escape, own, offer),
                     (true, true) => {
                         stack[depth] = right;
@@ -323,9 +324,9 @@ impl Tree {
         turns
     }
 
-    fn enters(&self, node: u32, own: &Aabb) -> bool {
-        let node = &self.nodes[node as usize];
-        overlaps(own.min, own.max, node.min, node.max)
+    #[inline]
+    fn enters(&self, node: u32, query: &Query) -> bool {
+        query.overlaps(&self.nodes[node as usize])
     }
 
     /// Panics unless the tree is one, over these boxes, with codes that rise.
