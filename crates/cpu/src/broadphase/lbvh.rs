@@ -109,8 +109,8 @@ fn shared(codes: &[u64], a: usize, b: i64) -> i32 {
 impl Tree {
     /// A tree of all bounded colliders that are fixed, or of those that are not.
     pub fn new(boxes: &Boxes, bits: MortonBits, members: u32) -> Self {
-        let list: Vec<u32> =
-            (0..boxes.aabbs.len() as u32).filter(|&i| is_member(&boxes.aabbs[i as usize], members)).collect();
+        let member = |i: &u32| is_member(&boxes.aabbs[*i as usize], members);
+        let list: Vec<u32> = (0..boxes.aabbs.len() as u32).into_par_iter().with_min_len(4096).filter(member).collect();
         Self::of_members(boxes, &list, bits)
     }
 
@@ -118,11 +118,20 @@ impl Tree {
     pub fn of_members(boxes: &Boxes, list: &[u32], bits: MortonBits) -> Self {
         let mut tree = Self::default();
         let quantizer = Quantizer::new(boxes, bits);
-        let mut keys: Vec<(u64, u32)> =
-            list.par_iter().map(|&i| (quantizer.code(&boxes.aabbs[i as usize]), i)).collect();
-        keys.par_sort();
-        tree.codes = keys.iter().map(|key| key.0).collect();
-        tree.members = keys.iter().map(|key| key.1).collect();
+        let code = |i: u32| quantizer.code(&boxes.aabbs[i as usize]);
+        // The collider decides between equal codes.
+        (tree.codes, tree.members) = match bits {
+            MortonBits::Bits63 => {
+                let mut keys: Vec<(u64, u32)> = list.par_iter().map(|&i| (code(i), i)).collect();
+                keys.par_sort_unstable();
+                keys.into_par_iter().unzip()
+            }
+            _ => {
+                let mut keys: Vec<u64> = list.par_iter().map(|&i| code(i) << 32 | u64::from(i)).collect();
+                keys.par_sort_unstable();
+                keys.into_par_iter().map(|key| (key >> 32, key as u32)).unzip()
+            }
+        };
         tree.link();
         tree.refit(boxes);
         tree
@@ -236,12 +245,14 @@ impl Tree {
         while next != end && turns <= TURN_LIMIT {
             turns += 1;
             let node = &self.nodes[next as usize];
-            let (enters, leaf) = (query.overlaps(node), next % 2 == 0);
-            if enters & leaf {
+            if !query.overlaps(node) {
+                next = node.escape;
+            } else if next % 2 == 0 {
                 offer(node.child);
+                next = node.escape;
+            } else {
+                next = node.child;
             }
-            // A choice of values and not of ways, which nobody could foretell.
-            next = if enters & !leaf { node.child } else { node.escape };
         }
         turns
     }
