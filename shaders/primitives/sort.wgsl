@@ -1,68 +1,22 @@
-// Stable radix sort of keys of 1 to 4 words with one value each: one digit of 4 bits, least significant first, by
+// Stable radix sort of keys of 1 to 4 words with one value each: one digit of up to 8 bits, least significant first, by
 //
-//   count_digits   how often each digit occurs in each block of 1,024 elements, to `histogram`, digit by digit;
+//   count_digits   how often each digit occurs in each block of 3,072 elements, to `histogram`, digit by digit;
 //   (primitives/scan of `histogram`: where each block's elements of each digit go)
 //   scatter        ranks the elements of a block and moves them there;
 //   copy           moves everything back if the number of digits was odd.
 //
-// One workgroup a block, 4 consecutive elements an invocation. Reads `keys_in` (element i's words from i * words on)
-// and `values_in`, writes `keys_out` and `values_out`. After Satish, Harris and Garland, "Designing Efficient Sorting
-// Algorithms for Manycore GPUs" (2009), and Harada and Howes, "Introduction to GPU Radix Sort" (2011).
+// One workgroup a block, 12 elements an invocation. Reads `keys_in` (element i's words from i * words on) and
+// `values_in`, writes `keys_out` and `values_out`. `scatter` sorts its block by half a digit at a time, with counters
+// for each invocation; primitives/sort_subgroup has another. After Satish, Harris and Garland, "Designing Efficient
+// Sorting Algorithms for Manycore GPUs" (2009), and Harada and Howes, "Introduction to GPU Radix Sort" (2011).
 
-//#import shared/thread.wgsl
-//#import shared/workgroup.wgsl
+//#import shared/sort.wgsl
 
-const NO_WORD: u32 = 0xffffffffu;
-const DIGITS: u32 = 16u;
-const EACH: u32 = 4u; // elements an invocation
-const BLOCK: u32 = 1024u; // elements a workgroup
-const COUNTERS: u32 = 8u; // words of counters an invocation, two counters a word
+const COPIES: u32 = 4u; // of the counters of count_digits, so that equal digits wait less for one another
+const HALF_BITS: u32 = 4u;
+const HALF_MASK: u32 = 15u;
 
-struct SortParams {
-    count: u32, // number of elements, if count_word is NO_WORD
-    count_word: u32, // else the word of `counts` that has it
-    capacity: u32, // at most so many elements
-    words: u32, // words of a key
-    word: u32, // the one that has the digit
-    shift: u32, // the digit's lowest bit
-    mask: u32, // its bits, once shifted
-    unused: u32,
-}
-
-@group(0) @binding(0) var<uniform> params: SortParams;
-@group(0) @binding(1) var<storage, read> counts: array<u32>;
-@group(0) @binding(2) var<storage, read> keys_in: array<u32>;
-@group(0) @binding(3) var<storage, read> values_in: array<u32>;
-@group(0) @binding(4) var<storage, read_write> keys_out: array<u32>;
-@group(0) @binding(5) var<storage, read_write> values_out: array<u32>;
-@group(0) @binding(6) var<storage, read_write> histogram: array<u32>;
-
-var<workgroup> digit_count: array<atomic<u32>, DIGITS>; // zero at first, like all workgroup memory
-var<workgroup> counters: array<u32, 2048>; // 8 x 256: counter words of all invocations, word by word
-var<workgroup> order: array<u32, BLOCK>; // which element comes at which place of the sorted block
-
-fn elements() -> u32 {
-    var count = params.count;
-    if params.count_word != NO_WORD {
-        count = counts[params.count_word];
-    }
-    return min(count, params.capacity);
-}
-
-fn blocks_of(count: u32) -> u32 {
-    return (count + BLOCK - 1u) / BLOCK;
-}
-
-fn digit_of(element: u32) -> u32 {
-    return (keys_in[element * params.words + params.word] >> params.shift) & params.mask;
-}
-
-fn move_element(from_place: u32, to_place: u32) {
-    for (var w = 0u; w < params.words; w++) {
-        keys_out[to_place * params.words + w] = keys_in[from_place * params.words + w];
-    }
-    values_out[to_place] = values_in[from_place];
-}
+var<workgroup> digit_count: array<atomic<u32>, 1024>; // COPIES * DIGITS; zero at first, like all workgroup memory
 
 @compute @workgroup_size(256)
 fn count_digits(
@@ -71,30 +25,117 @@ fn count_digits(
     @builtin(local_invocation_index) lid: u32,
 ) {
     let count = elements();
+    let blocks = blocks_of(count);
     let block = workgroup_index(wg, num);
     let local = local_index(lid);
-    for (var k = 0u; k < EACH; k++) {
-        let element = block * BLOCK + k * WORKGROUP + local;
+    let copy_start = (local % COPIES) * DIGITS;
+    for (var k = local; k < BLOCK; k += WORKGROUP) {
+        let element = block * BLOCK + k;
         if element < count {
-            atomicAdd(&digit_count[digit_of(element)], 1u);
+            atomicAdd(&digit_count[copy_start + digit_of(element, count)], 1u);
         }
     }
     workgroupBarrier();
-    if local < DIGITS && block < blocks_of(count) {
-        histogram[local * blocks_of(count) + block] = atomicLoad(&digit_count[local]);
+    if local < params.radix && block < blocks {
+        var sum = 0u;
+        for (var k = 0u; k < COPIES; k++) {
+            sum += atomicLoad(&digit_count[k * DIGITS + local]);
+        }
+        histogram[local * blocks + block] = sum;
     }
 }
 
-// Counters of digits 0 to 7 are the lower halves of the 8 words, those of 8 to 15 the upper ones. A block has 1,024
-// elements, so that no sum of a lower half reaches the upper one.
-fn half_of(word: u32, digit: u32) -> u32 {
-    return select(word & 0xffffu, word >> 16u, digit >= COUNTERS);
+// Counts one half digit in fields of 4 bits, 8 a word, and returns how many there were before. An invocation has 12
+// elements, so that no field overflows.
+fn take(fields: ptr<function, vec2<u32>>, half: u32) -> u32 {
+    let shift = 4u * (half & 7u);
+    let one = 1u << shift;
+    let is_upper = half >= 8u;
+    let before = (select((*fields).x, (*fields).y, is_upper) >> shift) & 15u;
+    *fields += select(vec2<u32>(one, 0u), vec2<u32>(0u, one), is_upper);
+    return before;
 }
 
-// Place in the sorted block of the first element of this digit that an invocation has, from the scanned counters.
-fn place(digit: u32, local: u32, lower_total: u32) -> u32 {
-    let before = half_of(counters[(digit % COUNTERS) * WORKGROUP + local], digit);
-    return before + select(0u, lower_total, digit >= COUNTERS);
+fn take_four(fields: ptr<function, vec2<u32>>, halves: vec4<u32>) -> vec4<u32> {
+    let x = take(fields, halves.x);
+    let y = take(fields, halves.y);
+    let z = take(fields, halves.z);
+    let w = take(fields, halves.w);
+    return vec4<u32>(x, y, z, w);
+}
+
+// Counters of the block lie in `staged`, 8 words an invocation, two counters a word: half digits 0 to 7 are the lower
+// parts of words 0 to 7, those of 8 to 15 the upper ones. A block has 3,072 elements, so that no sum of a lower part
+// reaches the upper one. A gap after each 8 words avoids bank conflicts.
+fn counter(word: u32, local: u32) -> u32 {
+    return 288u * word + local + local / 8u;
+}
+
+// Place in the sorted block of the first element of this half digit that an invocation has.
+fn place(half: u32, local: u32, lower_total: u32) -> u32 {
+    let upper = half >> 3u;
+    return ((staged[counter(half & 7u, local)] >> (16u * upper)) & 0xffffu) + upper * lower_total;
+}
+
+fn places(halves: vec4<u32>, local: u32, lower_total: u32) -> vec4<u32> {
+    return vec4<u32>(
+        place(halves.x, local, lower_total),
+        place(halves.y, local, lower_total),
+        place(halves.z, local, lower_total),
+        place(halves.w, local, lower_total),
+    );
+}
+
+// Places of 12 consecutive elements an invocation in the block sorted by these half digits. For all invocations at
+// once; `staged` is free before and after.
+fn rank_halves(local: u32, halves: Twelve) -> Twelve {
+    var fields = vec2<u32>();
+    var ranks: Twelve;
+    ranks.a = take_four(&fields, halves.a);
+    ranks.b = take_four(&fields, halves.b);
+    ranks.c = take_four(&fields, halves.c);
+    for (var word = 0u; word < 8u; word++) {
+        let pair = (fields >> vec2<u32>(4u * word)) & vec2<u32>(15u);
+        staged[counter(word, local)] = pair.x | (pair.y << 16u);
+    }
+    workgroupBarrier();
+
+    // Scan all counters, word by word and invocation by invocation within a word: 8 consecutive ones an invocation.
+    var sum = 0u;
+    for (var k = 0u; k < 8u; k++) {
+        sum += staged[9u * local + k];
+    }
+    let scanned = workgroup_scan(local, sum);
+    var before = scanned.before;
+    for (var k = 0u; k < 8u; k++) {
+        let value = staged[9u * local + k];
+        staged[9u * local + k] = before;
+        before += value;
+    }
+    workgroupBarrier();
+
+    let lower_total = scanned.total & 0xffffu;
+    ranks.a += places(halves.a, local, lower_total);
+    ranks.b += places(halves.b, local, lower_total);
+    ranks.c += places(halves.c, local, lower_total);
+    workgroupBarrier();
+    return ranks;
+}
+
+fn store_four(at: vec4<u32>, what: vec4<u32>) {
+    staged[at.x] = what.x;
+    staged[at.y] = what.y;
+    staged[at.z] = what.z;
+    staged[at.w] = what.w;
+}
+
+fn load_four(first: u32, step: u32) -> vec4<u32> {
+    return vec4<u32>(staged[first], staged[first + step], staged[first + 2u * step], staged[first + 3u * step]);
+}
+
+// The four bytes of a word.
+fn bytes_of(word: u32) -> vec4<u32> {
+    return (vec4<u32>(word) >> vec4<u32>(0u, 8u, 16u, 24u)) & vec4<u32>(0xffu);
 }
 
 @compute @workgroup_size(256)
@@ -104,59 +145,55 @@ fn scatter(
     @builtin(local_invocation_index) lid: u32,
 ) {
     let count = elements();
-    let blocks = blocks_of(count);
     let block = workgroup_index(wg, num);
     let local = local_index(lid);
-    let first = block * BLOCK + local * EACH;
+    find_offsets(block, local, count);
 
-    // Count this invocation's digits, and rank each of its elements among those of the same digit.
-    for (var w = 0u; w < COUNTERS; w++) {
-        counters[w * WORKGROUP + local] = 0u;
-    }
-    var digits: array<u32, EACH>;
-    var ranks: array<u32, EACH>;
-    for (var k = 0u; k < EACH; k++) {
-        if first + k < count {
-            let digit = digit_of(first + k);
-            let counter = (digit % COUNTERS) * WORKGROUP + local;
-            digits[k] = digit;
-            ranks[k] = half_of(counters[counter], digit);
-            counters[counter] += select(1u, 0x10000u, digit >= COUNTERS);
-        }
+    // The digits of 4 neighbours make a word; an invocation reads words far apart and then has 3 that are neighbours.
+    for (var four = local; four < BLOCK / 4u; four += WORKGROUP) {
+        let element = block * BLOCK + 4u * four;
+        var word = digit_of(element, count);
+        word |= digit_of(element + 1u, count) << 8u;
+        word |= digit_of(element + 2u, count) << 16u;
+        word |= digit_of(element + 3u, count) << 24u;
+        staged[four] = word;
     }
     workgroupBarrier();
-
-    // Scan all counters, word by word and invocation by invocation within a word: 8 consecutive ones an invocation.
-    var sum = 0u;
-    for (var k = 0u; k < COUNTERS; k++) {
-        sum += counters[local * COUNTERS + k];
-    }
-    let scanned = workgroup_scan(local, sum);
-    var before = scanned.before;
-    for (var k = 0u; k < COUNTERS; k++) {
-        let value = counters[local * COUNTERS + k];
-        counters[local * COUNTERS + k] = before;
-        before += value;
-    }
+    let digits = Twelve(bytes_of(staged[3u * local]), bytes_of(staged[3u * local + 1u]), bytes_of(staged[3u * local + 2u]));
     workgroupBarrier();
 
-    let lower_total = scanned.total & 0xffffu;
-    for (var k = 0u; k < EACH; k++) {
-        if first + k < count {
-            order[place(digits[k], local, lower_total) + ranks[k]] = local * EACH + k;
-        }
+    let half = vec4<u32>(HALF_MASK);
+    var ranks = rank_halves(local, Twelve(digits.a & half, digits.b & half, digits.c & half));
+    // 12 bits of the number in the block, and the digit's upper half.
+    let number = 12u * local + vec4<u32>(0u, 1u, 2u, 3u);
+    let bits = vec4<u32>(HALF_BITS);
+    let up = vec4<u32>(12u);
+    var items = Twelve(
+        number | ((digits.a >> bits) << up),
+        (number + 4u) | ((digits.b >> bits) << up),
+        (number + 8u) | ((digits.c >> bits) << up),
+    );
+    if params.mask > HALF_MASK {
+        store_four(ranks.a, items.a);
+        store_four(ranks.b, items.b);
+        store_four(ranks.c, items.c);
+        workgroupBarrier();
+        items = Twelve(load_four(12u * local, 1u), load_four(12u * local + 4u, 1u), load_four(12u * local + 8u, 1u));
+        workgroupBarrier();
+        ranks = rank_halves(local, Twelve(items.a >> up, items.b >> up, items.c >> up));
     }
+    let low = vec4<u32>(0xfffu);
+    store_four(items.a & low, ranks.a);
+    store_four(items.b & low, ranks.b);
+    store_four(items.c & low, ranks.c);
     workgroupBarrier();
-
-    // Move the elements in their new order, so that neighbours write to neighbouring places.
-    for (var k = 0u; k < EACH; k++) {
-        let sorted = k * WORKGROUP + local;
-        if block * BLOCK + sorted < count {
-            let element = block * BLOCK + order[sorted];
-            let digit = digit_of(element);
-            move_element(element, histogram[digit * blocks + block] + sorted - place(digit, 0u, lower_total));
-        }
-    }
+    ranks = Twelve(
+        load_four(local, WORKGROUP),
+        load_four(local + 4u * WORKGROUP, WORKGROUP),
+        load_four(local + 8u * WORKGROUP, WORKGROUP),
+    );
+    workgroupBarrier();
+    move_block(block, local, count, ranks);
 }
 
 @compute @workgroup_size(256)
@@ -165,12 +202,14 @@ fn copy(
     @builtin(num_workgroups) num: vec3<u32>,
     @builtin(local_invocation_index) lid: u32,
 ) {
-    let count = elements();
-    let block = workgroup_index(wg, num);
-    for (var k = 0u; k < EACH; k++) {
-        let element = block * BLOCK + k * WORKGROUP + local_index(lid);
-        if element < count {
-            move_element(element, element);
+    let end = min(elements(), (workgroup_index(wg, num) + 1u) * BLOCK);
+    for (var k = local_index(lid); k < BLOCK; k += WORKGROUP) {
+        let element = workgroup_index(wg, num) * BLOCK + k;
+        if element < end {
+            for (var w = 0u; w < params.words; w++) {
+                keys_out[element * params.words + w] = keys_in[element * params.words + w];
+            }
+            values_out[element] = values_in[element];
         }
     }
 }

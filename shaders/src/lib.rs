@@ -36,6 +36,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/narrowphase", include_str!("../shared/narrowphase.wgsl")),
     ("shared/pair", include_str!("../shared/pair.wgsl")),
     ("shared/recycle", include_str!("../shared/recycle.wgsl")),
+    ("shared/sort", include_str!("../shared/sort.wgsl")),
     ("shared/step", include_str!("../shared/step.wgsl")),
     ("shared/thread", include_str!("../shared/thread.wgsl")),
     ("shared/workgroup", include_str!("../shared/workgroup.wgsl")),

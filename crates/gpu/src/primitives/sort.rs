@@ -13,11 +13,9 @@ use crate::pipelines::{Pass, Pipelines};
 use crate::recorder::{Bind, Recorder};
 
 /// Elements of one workgroup.
-const BLOCK: u32 = 1024;
-/// Bits of one digit.
-const DIGIT_BITS: u32 = 4;
-/// Values of a digit.
-const DIGITS: u32 = 1 << DIGIT_BITS;
+const BLOCK: u32 = 3072;
+/// Most bits of one digit.
+const DIGIT_BITS: u32 = 8;
 
 /// What a [`Sort`] is to do.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,6 +36,8 @@ pub struct Sort {
     passes: Passes,
     options: SortOptions,
     digits: Vec<Digit>,
+    /// Rows of the histogram: values of the widest digit.
+    radix: u32,
     params: wgpu::Buffer,
     keys: wgpu::Buffer,
     values: wgpu::Buffer,
@@ -80,19 +80,21 @@ struct SortParams {
     word: u32,
     shift: u32,
     mask: u32,
-    unused: u32,
+    radix: u32,
 }
 
-/// The digits of a key, least significant first; none spans two words.
+/// The digits of a key, least significant first; none spans two words, and those of a word share its bits evenly.
 fn digits(bits: &[u32]) -> Vec<Digit> {
-    let of_word = |(word, &bits): (usize, &u32)| {
-        (0..bits).step_by(DIGIT_BITS as usize).map(move |shift| Digit {
-            word: word as u32,
-            shift,
-            mask: (1 << DIGIT_BITS.min(bits - shift)) - 1,
-        })
-    };
-    bits.iter().enumerate().rev().flat_map(of_word).collect()
+    let mut digits = Vec::new();
+    for (word, &bits) in bits.iter().enumerate().rev() {
+        let mut shift = 0;
+        for left in (1..=bits.div_ceil(DIGIT_BITS)).rev() {
+            let width = (bits - shift).div_ceil(left);
+            digits.push(Digit { word: word as u32, shift, mask: (1 << width) - 1 });
+            shift += width;
+        }
+    }
+    digits
 }
 
 impl Sort {
@@ -112,17 +114,18 @@ impl Sort {
             scatter: pipelines.pass(gpu, "primitives/sort", "scatter")?,
             copy: pipelines.pass(gpu, "primitives/sort", "copy")?,
         };
+        let digits = digits(&options.bits);
+        let radix = digits.iter().map(|digit| digit.mask + 1).max().unwrap_or(1);
         let capacity = options.capacity;
         let scan_options = ScanOptions { capacity, count: options.count, total: None };
-        let scan = Scan::shaped(gpu, pipelines, scan_options, Shape { per: BLOCK, times: DIGITS })?;
+        let scan = Scan::shaped(gpu, pipelines, scan_options, Shape { per: BLOCK, times: radix })?;
         let args = match options.count {
             Count::Host(_) => None,
             Count::Word(word) => {
-                let jobs = [Job::new(word, capacity, BLOCK), Job::new(word, capacity, Scan::BLOCK / DIGITS * BLOCK)];
+                let jobs = [Job::new(word, capacity, BLOCK), Job::new(word, capacity, Scan::BLOCK / radix * BLOCK)];
                 Some(Args::new(gpu, pipelines, &jobs)?)
             }
         };
-        let digits = digits(&options.bits);
         let [elements, words, steps] = [capacity.into(), options.bits.len() as u64, digits.len() as u64];
         let storage = BufferUsages::STORAGE;
         let uniform = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
@@ -133,13 +136,14 @@ impl Sort {
             values: gpu.create_buffer("sort values", elements * 4, storage)?,
             histogram: gpu.create_buffer(
                 "sort histogram",
-                u64::from(capacity.div_ceil(BLOCK)) * u64::from(DIGITS) * 4,
+                u64::from(capacity.div_ceil(BLOCK)) * u64::from(radix) * 4,
                 storage,
             )?,
             no_counts: gpu.create_buffer("sort without counts", 4, storage)?,
             scan,
             args,
             digits,
+            radix,
             options,
         };
         sort.write(gpu, sort.options.count)?;
@@ -177,7 +181,7 @@ impl Sort {
         let (count, count_word) = count.words();
         let words = self.options.bits.len() as u32;
         for (step, &Digit { word, shift, mask }) in self.digits.iter().enumerate() {
-            let params = SortParams { count, count_word, capacity, words, word, shift, mask, unused: 0 };
+            let params = SortParams { count, count_word, capacity, words, word, shift, mask, radix: self.radix };
             gpu.queue.write_buffer(&self.params, step as u64 * UNIFORM_STEP, bytemuck::bytes_of(&params));
         }
         Ok(())
