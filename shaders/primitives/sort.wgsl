@@ -6,15 +6,16 @@
 //   copy           moves everything back if the number of digits was odd.
 //
 // One workgroup a block, 12 elements an invocation. Reads `keys_in` (element i's words from i * words on) and
-// `values_in`, writes `keys_out` and `values_out`. `scatter` sorts its block by half a digit at a time, with counters
-// for each invocation; primitives/sort_subgroup has another. After Satish, Harris and Garland, "Designing Efficient
+// `values_in`, writes `keys_out` and `values_out`. `scatter` ranks the 192 elements of
+// each of 16 columns one after the other; primitives/sort_subgroup has another way. After Satish, Harris and Garland, "Designing Efficient
 // Sorting Algorithms for Manycore GPUs" (2009), and Harada and Howes, "Introduction to GPU Radix Sort" (2011).
 
 //#import shared/sort.wgsl
 
 const COPIES: u32 = 4u; // of the counters of count_digits, so that equal digits wait less for one another
-const HALF_BITS: u32 = 4u;
-const HALF_MASK: u32 = 15u;
+const COLUMNS: u32 = 16u; // of a block
+const COLUMN_WORDS: u32 = 48u; // four elements a word
+const FOURS: u32 = 2304u; // where these words begin in `staged`, behind the counters
 
 var<workgroup> digit_count: array<atomic<u32>, 1024>; // COPIES * DIGITS; zero at first, like all workgroup memory
 
@@ -32,7 +33,8 @@ fn count_digits(
     for (var k = local; k < BLOCK; k += WORKGROUP) {
         let element = block * BLOCK + k;
         if element < count {
-            atomicAdd(&digit_count[copy_start + digit_of(element, count)], 1u);
+            let digit = (keys_in[element * params.words + params.word] >> params.shift) & params.mask;
+            atomicAdd(&digit_count[copy_start + digit], 1u);
         }
     }
     workgroupBarrier();
@@ -45,97 +47,46 @@ fn count_digits(
     }
 }
 
-// Counts one half digit in fields of 4 bits, 8 a word, and returns how many there were before. An invocation has 12
-// elements, so that no field overflows.
-fn take(fields: ptr<function, vec2<u32>>, half: u32) -> u32 {
-    let shift = 4u * (half & 7u);
-    let one = 1u << shift;
-    let is_upper = half >= 8u;
-    let before = (select((*fields).x, (*fields).y, is_upper) >> shift) & 15u;
-    *fields += select(vec2<u32>(one, 0u), vec2<u32>(0u, one), is_upper);
-    return before;
+// Counters lie in `staged`, one for each digit and each column of 192 elements, digit by digit, two a word: those of
+// digits 0 to 127 are the lower parts of the words, those of 128 to 255 the upper ones. A block has 3,072 elements, so
+// that no sum of a lower part reaches the upper one. A gap after each 8 words avoids bank conflicts.
+fn counter(digit: u32, column: u32) -> u32 {
+    let index = (digit & 127u) * COLUMNS + column;
+    return index + index / 8u;
 }
 
-fn take_four(fields: ptr<function, vec2<u32>>, halves: vec4<u32>) -> vec4<u32> {
-    let x = take(fields, halves.x);
-    let y = take(fields, halves.y);
-    let z = take(fields, halves.z);
-    let w = take(fields, halves.w);
-    return vec4<u32>(x, y, z, w);
+fn part_of(counter_word: u32, digit: u32) -> u32 {
+    return (counter_word >> (16u * (digit >> 7u))) & 0xffffu;
 }
 
-// Counters of the block lie in `staged`, 8 words an invocation, two counters a word: half digits 0 to 7 are the lower
-// parts of words 0 to 7, those of 8 to 15 the upper ones. A block has 3,072 elements, so that no sum of a lower part
-// reaches the upper one. A gap after each 8 words avoids bank conflicts.
-fn counter(word: u32, local: u32) -> u32 {
-    return 288u * word + local + local / 8u;
+// Counts one element, and returns how many of its digit came before it in its column.
+fn take(digit: u32, column: u32) -> u32 {
+    let at = counter(digit, column);
+    let before = staged[at];
+    staged[at] = before + (1u << (16u * (digit >> 7u)));
+    return part_of(before, digit);
 }
 
-// Place in the sorted block of the first element of this half digit that an invocation has.
-fn place(half: u32, local: u32, lower_total: u32) -> u32 {
-    let upper = half >> 3u;
-    return ((staged[counter(half & 7u, local)] >> (16u * upper)) & 0xffffu) + upper * lower_total;
+// Place in the sorted block of a column's first element of this digit, from the scanned counters.
+fn place(digit: u32, column: u32, lower_total: u32) -> u32 {
+    return part_of(staged[counter(digit, column)], digit) + select(0u, lower_total, digit > 127u);
 }
 
-fn places(halves: vec4<u32>, local: u32, lower_total: u32) -> vec4<u32> {
-    return vec4<u32>(
-        place(halves.x, local, lower_total),
-        place(halves.y, local, lower_total),
-        place(halves.z, local, lower_total),
-        place(halves.w, local, lower_total),
+// Places of the four elements whose ranks in their column are the bytes of word `four`.
+fn places(four: u32, digits: vec4<u32>, lower_total: u32) -> vec4<u32> {
+    let column = four / COLUMN_WORDS;
+    let first = vec4<u32>(
+        place(digits.x, column, lower_total),
+        place(digits.y, column, lower_total),
+        place(digits.z, column, lower_total),
+        place(digits.w, column, lower_total),
     );
+    let ranks = (vec4<u32>(staged[FOURS + four]) >> vec4<u32>(0u, 8u, 16u, 24u)) & vec4<u32>(0xffu);
+    return first + ranks;
 }
 
-// Places of 12 consecutive elements an invocation in the block sorted by these half digits. For all invocations at
-// once; `staged` is free before and after.
-fn rank_halves(local: u32, halves: Twelve) -> Twelve {
-    var fields = vec2<u32>();
-    var ranks: Twelve;
-    ranks.a = take_four(&fields, halves.a);
-    ranks.b = take_four(&fields, halves.b);
-    ranks.c = take_four(&fields, halves.c);
-    for (var word = 0u; word < 8u; word++) {
-        let pair = (fields >> vec2<u32>(4u * word)) & vec2<u32>(15u);
-        staged[counter(word, local)] = pair.x | (pair.y << 16u);
-    }
-    workgroupBarrier();
-
-    // Scan all counters, word by word and invocation by invocation within a word: 8 consecutive ones an invocation.
-    var sum = 0u;
-    for (var k = 0u; k < 8u; k++) {
-        sum += staged[9u * local + k];
-    }
-    let scanned = workgroup_scan(local, sum);
-    var before = scanned.before;
-    for (var k = 0u; k < 8u; k++) {
-        let value = staged[9u * local + k];
-        staged[9u * local + k] = before;
-        before += value;
-    }
-    workgroupBarrier();
-
-    let lower_total = scanned.total & 0xffffu;
-    ranks.a += places(halves.a, local, lower_total);
-    ranks.b += places(halves.b, local, lower_total);
-    ranks.c += places(halves.c, local, lower_total);
-    workgroupBarrier();
-    return ranks;
-}
-
-fn store_four(at: vec4<u32>, what: vec4<u32>) {
-    staged[at.x] = what.x;
-    staged[at.y] = what.y;
-    staged[at.z] = what.z;
-    staged[at.w] = what.w;
-}
-
-fn load_four(first: u32, step: u32) -> vec4<u32> {
-    return vec4<u32>(staged[first], staged[first + step], staged[first + 2u * step], staged[first + 3u * step]);
-}
-
-// The four bytes of a word.
-fn bytes_of(word: u32) -> vec4<u32> {
-    return (vec4<u32>(word) >> vec4<u32>(0u, 8u, 16u, 24u)) & vec4<u32>(0xffu);
+fn packed(bytes: vec4<u32>) -> u32 {
+    return bytes.x | (bytes.y << 8u) | (bytes.z << 16u) | (bytes.w << 24u);
 }
 
 @compute @workgroup_size(256)
@@ -145,55 +96,57 @@ fn scatter(
     @builtin(local_invocation_index) lid: u32,
 ) {
     let count = elements();
+    let blocks = blocks_of(count);
     let block = workgroup_index(wg, num);
     let local = local_index(lid);
-    find_offsets(block, local, count);
-
-    // The digits of 4 neighbours make a word; an invocation reads words far apart and then has 3 that are neighbours.
-    for (var four = local; four < BLOCK / 4u; four += WORKGROUP) {
-        let element = block * BLOCK + 4u * four;
-        var word = digit_of(element, count);
-        word |= digit_of(element + 1u, count) << 8u;
-        word |= digit_of(element + 2u, count) << 16u;
-        word |= digit_of(element + 3u, count) << 24u;
-        staged[four] = word;
-    }
-    workgroupBarrier();
-    let digits = Twelve(bytes_of(staged[3u * local]), bytes_of(staged[3u * local + 1u]), bytes_of(staged[3u * local + 2u]));
+    let keys = load_twelve(block, local, params.word, count);
+    let first = block * BLOCK + 4u * local;
+    let digits = Twelve(
+        digits_of(first, keys.a, count),
+        digits_of(first + 4u * WORKGROUP, keys.b, count),
+        digits_of(first + 8u * WORKGROUP, keys.c, count),
+    );
+    staged[FOURS + local] = packed(digits.a);
+    staged[FOURS + WORKGROUP + local] = packed(digits.b);
+    staged[FOURS + 2u * WORKGROUP + local] = packed(digits.c);
     workgroupBarrier();
 
-    let half = vec4<u32>(HALF_MASK);
-    var ranks = rank_halves(local, Twelve(digits.a & half, digits.b & half, digits.c & half));
-    // 12 bits of the number in the block, and the digit's upper half.
-    let number = 12u * local + vec4<u32>(0u, 1u, 2u, 3u);
-    let bits = vec4<u32>(HALF_BITS);
-    let up = vec4<u32>(12u);
-    var items = Twelve(
-        number | ((digits.a >> bits) << up),
-        (number + 4u) | ((digits.b >> bits) << up),
-        (number + 8u) | ((digits.c >> bits) << up),
-    );
-    if params.mask > HALF_MASK {
-        store_four(ranks.a, items.a);
-        store_four(ranks.b, items.b);
-        store_four(ranks.c, items.c);
-        workgroupBarrier();
-        items = Twelve(load_four(12u * local, 1u), load_four(12u * local + 4u, 1u), load_four(12u * local + 8u, 1u));
-        workgroupBarrier();
-        ranks = rank_halves(local, Twelve(items.a >> up, items.b >> up, items.c >> up));
+    // One invocation a column ranks its elements, one after the other: each digit gives way to its rank.
+    if local < COLUMNS {
+        let begin = FOURS + local * COLUMN_WORDS;
+        for (var at = begin; at < begin + COLUMN_WORDS; at++) {
+            let four = staged[at];
+            var ranks = take(four & 0xffu, local);
+            ranks |= take((four >> 8u) & 0xffu, local) << 8u;
+            ranks |= take((four >> 16u) & 0xffu, local) << 16u;
+            staged[at] = ranks | (take(four >> 24u, local) << 24u);
+        }
     }
-    let low = vec4<u32>(0xfffu);
-    store_four(items.a & low, ranks.a);
-    store_four(items.b & low, ranks.b);
-    store_four(items.c & low, ranks.c);
     workgroupBarrier();
-    ranks = Twelve(
-        load_four(local, WORKGROUP),
-        load_four(local + 4u * WORKGROUP, WORKGROUP),
-        load_four(local + 8u * WORKGROUP, WORKGROUP),
+
+    // Scan all counters: 8 consecutive ones an invocation.
+    let base = 9u * local;
+    let low = vec4<u32>(staged[base], staged[base + 1u], staged[base + 2u], staged[base + 3u]);
+    let high = vec4<u32>(staged[base + 4u], staged[base + 5u], staged[base + 6u], staged[base + 7u]);
+    let low_sum = low.x + low.y + low.z + low.w;
+    let scanned = workgroup_scan(local, low_sum + high.x + high.y + high.z + high.w);
+    let low_before = scanned.before + vec4<u32>(0u, low.x, low.x + low.y, low.x + low.y + low.z);
+    let high_before = scanned.before + low_sum + vec4<u32>(0u, high.x, high.x + high.y, high.x + high.y + high.z);
+    stage_four(vec4<u32>(base, base + 1u, base + 2u, base + 3u), low_before);
+    stage_four(vec4<u32>(base + 4u, base + 5u, base + 6u, base + 7u), high_before);
+    workgroupBarrier();
+
+    let lower_total = scanned.total & 0xffffu;
+    if local < params.radix && block < blocks {
+        digit_offset[local] = histogram[local * blocks + block] - place(local, 0u, lower_total);
+    }
+    let ranks = Twelve(
+        places(local, digits.a, lower_total),
+        places(local + WORKGROUP, digits.b, lower_total),
+        places(local + 2u * WORKGROUP, digits.c, lower_total),
     );
     workgroupBarrier();
-    move_block(block, local, count, ranks);
+    move_block(block, local, count, ranks, keys);
 }
 
 @compute @workgroup_size(256)

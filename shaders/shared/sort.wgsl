@@ -29,8 +29,8 @@ struct SortParams {
 var<workgroup> staged: array<u32, BLOCK>; // counters at first, then one word of each element
 var<workgroup> digit_offset: array<u32, DIGITS>; // from a place in the sorted block to the place in the whole array
 
-// One number for each of 12 elements of an invocation. In variables of their own, since an array that a loop indexes
-// may end up in memory.
+// One number for each of 12 elements of an invocation: those of a are neighbours, as are those of b and of c. In
+// variables of their own, since an array that a loop indexes may end up in memory.
 struct Twelve {
     a: vec4<u32>,
     b: vec4<u32>,
@@ -49,107 +49,115 @@ fn blocks_of(count: u32) -> u32 {
     return count / BLOCK + select(0u, 1u, count % BLOCK != 0u);
 }
 
-fn digit_in(key_word: u32) -> u32 {
-    return (key_word >> params.shift) & params.mask;
-}
-
 // Elements past the end have the largest digit, and come last in their block.
-fn digit_of(element: u32, count: u32) -> u32 {
-    if element < count {
-        return digit_in(keys_in[element * params.words + params.word]);
+fn digits_of(first: u32, words: vec4<u32>, count: u32) -> vec4<u32> {
+    let digits = (words >> vec4<u32>(params.shift)) & vec4<u32>(params.mask);
+    let element = vec4<u32>(first, first + 1u, first + 2u, first + 3u);
+    return select(vec4<u32>(params.mask), digits, element < vec4<u32>(count));
+}
+
+// Word `word` of a key, or the value when a key has no such word.
+fn load(element: u32, word: u32, count: u32) -> u32 {
+    if element >= count {
+        return 0u;
     }
-    return params.mask;
-}
-
-// Fills `digit_offset`: where the block's elements of each digit go, from the scanned histogram, less where they begin
-// in the sorted block. How many there are is the step to the histogram's next element. For all invocations at once.
-fn find_offsets(block: u32, local: u32, count: u32) {
-    let blocks = blocks_of(count);
-    var start = 0u;
-    var size = 0u;
-    if local < params.radix && block < blocks {
-        let entry = local * blocks + block;
-        start = histogram[entry];
-        size = count - start;
-        if entry + 1u < params.radix * blocks {
-            size = histogram[entry + 1u] - start;
-        }
+    if word < params.words {
+        return keys_in[element * params.words + word];
     }
-    let scanned = workgroup_scan(local, size);
-    digit_offset[local] = start - scanned.before;
+    return values_in[element];
 }
 
-// Word `word` of a key, or the value when the key has no such word.
-fn stage_one(element: u32, rank: u32, word: u32, count: u32) {
-    if element < count {
-        if word < params.words {
-            staged[rank] = keys_in[element * params.words + word];
-        } else {
-            staged[rank] = values_in[element];
-        }
-    }
-}
-
-fn stage_four(first: u32, ranks: vec4<u32>, word: u32, count: u32) {
-    stage_one(first, ranks.x, word, count);
-    stage_one(first + WORKGROUP, ranks.y, word, count);
-    stage_one(first + 2u * WORKGROUP, ranks.z, word, count);
-    stage_one(first + 3u * WORKGROUP, ranks.w, word, count);
-}
-
-fn target_of(place: u32) -> u32 {
-    return digit_offset[digit_in(staged[place])] + place;
-}
-
-fn targets_of_four(first: u32) -> vec4<u32> {
+fn load_four(first: u32, word: u32, count: u32) -> vec4<u32> {
     return vec4<u32>(
-        target_of(first),
-        target_of(first + WORKGROUP),
-        target_of(first + 2u * WORKGROUP),
-        target_of(first + 3u * WORKGROUP),
+        load(first, word, count),
+        load(first + 1u, word, count),
+        load(first + 2u, word, count),
+        load(first + 3u, word, count),
     );
 }
 
-fn write_one(place: u32, target_place: u32, word: u32, size: u32) {
+// One word of the elements that an invocation ranks: `local` and three more, and the same 1,024 and 2,048 further on.
+fn load_twelve(block: u32, local: u32, word: u32, count: u32) -> Twelve {
+    let first = block * BLOCK + 4u * local;
+    return Twelve(
+        load_four(first, word, count),
+        load_four(first + 4u * WORKGROUP, word, count),
+        load_four(first + 8u * WORKGROUP, word, count),
+    );
+}
+
+fn stage_four(ranks: vec4<u32>, words: vec4<u32>) {
+    staged[ranks.x] = words.x;
+    staged[ranks.y] = words.y;
+    staged[ranks.z] = words.z;
+    staged[ranks.w] = words.w;
+}
+
+fn staged_four(first: u32) -> vec4<u32> {
+    return vec4<u32>(
+        staged[first],
+        staged[first + WORKGROUP],
+        staged[first + 2u * WORKGROUP],
+        staged[first + 3u * WORKGROUP],
+    );
+}
+
+fn targets_of(first: u32, words: vec4<u32>) -> vec4<u32> {
+    let digits = (words >> vec4<u32>(params.shift)) & vec4<u32>(params.mask);
+    return vec4<u32>(
+        digit_offset[digits.x] + first,
+        digit_offset[digits.y] + first + WORKGROUP,
+        digit_offset[digits.z] + first + 2u * WORKGROUP,
+        digit_offset[digits.w] + first + 3u * WORKGROUP,
+    );
+}
+
+fn write(place: u32, size: u32, target_place: u32, word: u32, what: u32) {
     if place < size {
         if word < params.words {
-            keys_out[target_place * params.words + word] = staged[place];
+            keys_out[target_place * params.words + word] = what;
         } else {
-            values_out[target_place] = staged[place];
+            values_out[target_place] = what;
         }
     }
 }
 
-fn write_four(first: u32, targets: vec4<u32>, word: u32, size: u32) {
-    write_one(first, targets.x, word, size);
-    write_one(first + WORKGROUP, targets.y, word, size);
-    write_one(first + 2u * WORKGROUP, targets.z, word, size);
-    write_one(first + 3u * WORKGROUP, targets.w, word, size);
+fn write_four(first: u32, size: u32, targets: vec4<u32>, word: u32, words: vec4<u32>) {
+    write(first, size, targets.x, word, words.x);
+    write(first + WORKGROUP, size, targets.y, word, words.y);
+    write(first + 2u * WORKGROUP, size, targets.z, word, words.z);
+    write(first + 3u * WORKGROUP, size, targets.w, word, words.w);
 }
 
-// Moves the elements of a block, word by word through workgroup memory, so that invocations side by side read
-// neighbours and write runs of neighbours. `ranks.a.x` is the place in the sorted block of the block's element `local`,
-// `ranks.a.y` that of element `local` + 256, and so on. For all invocations at once, with `staged` free.
-fn move_block(block: u32, local: u32, count: u32, ranks: Twelve) {
+// Moves the elements of a block, word by word through workgroup memory, so that invocations side by side write runs of
+// neighbours. `ranks` are the places in the sorted block of the elements of load_twelve, `keys` their words with the
+// digit. For all invocations at once, with `staged` free and `digit_offset` filled.
+fn move_block(block: u32, local: u32, count: u32, ranks: Twelve, keys: Twelve) {
     let begin = block * BLOCK;
     let size = select(0u, count - begin, begin < count);
-    let from_place = begin + local;
     let four = 4u * WORKGROUP;
+    var words = keys;
     var targets: Twelve;
     for (var w = 0u; w <= params.words; w++) {
         // The word with the digit comes first, as it says where the others go; the values come last.
         let turned = params.word + w;
         let word = select(select(turned, turned - params.words, turned >= params.words), w, w == params.words);
-        stage_four(from_place, ranks.a, word, count);
-        stage_four(from_place + four, ranks.b, word, count);
-        stage_four(from_place + 2u * four, ranks.c, word, count);
-        workgroupBarrier();
-        if w == 0u {
-            targets = Twelve(targets_of_four(local), targets_of_four(local + four), targets_of_four(local + 2u * four));
+        if w > 0u {
+            words = load_twelve(block, local, word, count);
         }
-        write_four(local, targets.a, word, size);
-        write_four(local + four, targets.b, word, size);
-        write_four(local + 2u * four, targets.c, word, size);
+        stage_four(ranks.a, words.a);
+        stage_four(ranks.b, words.b);
+        stage_four(ranks.c, words.c);
+        workgroupBarrier();
+        words = Twelve(staged_four(local), staged_four(local + four), staged_four(local + 2u * four));
+        if w == 0u {
+            targets.a = targets_of(local, words.a);
+            targets.b = targets_of(local + four, words.b);
+            targets.c = targets_of(local + 2u * four, words.c);
+        }
+        write_four(local, size, targets.a, word, words.a);
+        write_four(local + four, size, targets.b, word, words.b);
+        write_four(local + 2u * four, size, targets.c, word, words.c);
         workgroupBarrier();
     }
 }
