@@ -7,7 +7,7 @@ use common::{download, gpu, run, upload};
 use tumble_core::Error;
 use tumble_cpu::primitives::{exclusive_scan, radix_sort};
 use tumble_gpu::pipelines::build_pass;
-use tumble_gpu::primitives::{Args, Count, Job, Scan, ScanOptions, Sort, SortOptions};
+use tumble_gpu::primitives::{Args, Count, Job, Ranking, Scan, ScanOptions, Sort, SortOptions};
 use tumble_gpu::{Bind, BindCache, Buffers, Pipelines, Recorder, Shader, recorder};
 
 const SIZES: &[u32] = &[0, 1, 2, 255, 256, 257, 1023, 1024, 1025, 3000, 65_537, 300_000];
@@ -129,7 +129,7 @@ fn check_sort(pipelines: &mut Pipelines, keys: &[u32], bits: &[u32], count: Coun
     let used = size as usize;
     let values: Vec<u32> = (0..used as u32 + 3).map(|i| i ^ 0x5555).collect();
     let options = SortOptions { capacity: size + 2, count, bits: bits.to_vec() };
-    let sort = Sort::new(gpu(), pipelines, options).unwrap();
+    let sort = Sort::with_ranking(gpu(), pipelines, options, Ranking::Subgroup).unwrap();
     let (gpu_keys, gpu_values) = (upload(keys), upload(&values));
     let gpu_counts = upload(&counts_with(count, size));
     let counts = matches!(count, Count::Word(_)).then_some(&gpu_counts);

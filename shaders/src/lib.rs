@@ -22,6 +22,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("primitives/args", include_str!("../primitives/args.wgsl")),
     ("primitives/scan", include_str!("../primitives/scan.wgsl")),
     ("primitives/sort", include_str!("../primitives/sort.wgsl")),
+    ("primitives/sort_subgroup", include_str!("../primitives/sort_subgroup.wgsl")),
     ("shared/aabb", include_str!("../shared/aabb.wgsl")),
     ("shared/body", include_str!("../shared/body.wgsl")),
     ("shared/clip", include_str!("../shared/clip.wgsl")),

@@ -6,7 +6,7 @@ mod sort;
 
 pub use args::{Args, Job};
 pub use scan::{Scan, ScanOptions};
-pub use sort::{Sort, SortOptions};
+pub use sort::{Ranking, Sort, SortOptions};
 
 /// Stands for "no word" in the shaders.
 const NO_WORD: u32 = u32::MAX;

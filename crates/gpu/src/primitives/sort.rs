@@ -29,6 +29,17 @@ pub struct SortOptions {
     pub bits: Vec<u32>,
 }
 
+/// How a workgroup finds the order of its elements. The result is the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Ranking {
+    /// With workgroup memory alone, on any device. What [`Sort::new`] takes.
+    #[default]
+    Portable,
+    /// With sub-group operations, on devices that have `wgpu::Features::SUBGROUP` ([`Gpu::has_subgroups`]); slow where
+    /// sub-groups have fewer than 32 invocations. Measure before choosing it: `cargo bench --bench sort`.
+    Subgroup,
+}
+
 /// A sort of keys of one shape, with one u32 value each, up to some capacity. The passes are shared by all sorts of one
 /// [`Pipelines`]; the scratch, as large as the keys and values together, is its own.
 #[derive(Debug)]
@@ -98,12 +109,33 @@ fn digits(bits: &[u32]) -> Vec<Digit> {
 }
 
 impl Sort {
-    /// Makes a sort.
+    /// Makes a sort, with the ranking that works everywhere.
     ///
     /// # Errors
     /// [`Error::Invalid`] for keys of no or more than 4 words, or more than 32 bits of a word; [`Error::Capacity`] when
     /// the host's count is more than the capacity; as for [`Pipelines::pass`] and [`Gpu::create_buffer`].
     pub fn new(gpu: &Gpu, pipelines: &mut Pipelines, options: SortOptions) -> Result<Self> {
+        Self::with_ranking(gpu, pipelines, options, Ranking::Portable)
+    }
+
+    /// Makes a sort with this ranking.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for sub-group ranking on a device without sub-group operations; as for [`Sort::new`].
+    pub fn with_ranking(
+        gpu: &Gpu,
+        pipelines: &mut Pipelines,
+        options: SortOptions,
+        ranking: Ranking,
+    ) -> Result<Self> {
+        let scatter = match ranking {
+            Ranking::Portable => "primitives/sort",
+            Ranking::Subgroup if gpu.has_subgroups() => "primitives/sort_subgroup",
+            Ranking::Subgroup => {
+                let (value, allowed) = ("Subgroup".into(), "Portable, since the device lacks Features::SUBGROUP");
+                return Err(Error::Invalid { what: "Sort".into(), field: "ranking", value, allowed });
+            }
+        };
         let allowed = "1 to 4 entries of 0 to 32";
         if !(1..=4).contains(&options.bits.len()) || options.bits.iter().any(|bits| *bits > 32) {
             let value = format!("{:?}", options.bits);
@@ -111,7 +143,7 @@ impl Sort {
         }
         let passes = Passes {
             count_digits: pipelines.pass(gpu, "primitives/sort", "count_digits")?,
-            scatter: pipelines.pass(gpu, "primitives/sort", "scatter")?,
+            scatter: pipelines.pass(gpu, scatter, "scatter")?,
             copy: pipelines.pass(gpu, "primitives/sort", "copy")?,
         };
         let digits = digits(&options.bits);
