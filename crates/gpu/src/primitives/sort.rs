@@ -74,7 +74,7 @@ struct Digit {
 }
 
 /// Where a pass reads or writes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 struct Ends<'a> {
     keys: &'a wgpu::Buffer,
     values: &'a wgpu::Buffer,
@@ -219,6 +219,18 @@ impl Sort {
         Ok(())
     }
 
+    /// Bytes that a sort of `count` elements reads and writes, all passes together, by the algorithm: each digit's pass
+    /// reads the word with the digit, reads and writes keys and values, and goes through the histogram five times
+    /// (written, summed, read and written by the scan, read). The copy that ends [`Sort::record`] when the number of
+    /// digits is odd counts as well.
+    pub fn traffic_bytes(&self, count: u32) -> u64 {
+        let elements = u64::from(count);
+        let moved = 2 * 4 * elements * (self.options.bits.len() as u64 + 1);
+        let histogram = 4 * u64::from(count.div_ceil(BLOCK)) * u64::from(self.radix);
+        let digits = self.digits.len() as u64;
+        digits * (4 * elements + moved + 5 * histogram) + (digits % 2) * moved
+    }
+
     /// Records the sort of `keys` (element i's words from i * words on) and `values`, both storage, both sorted in
     /// place when it has run. `counts` (storage) is needed when the count is a word of it.
     ///
@@ -231,6 +243,28 @@ impl Sort {
         values: &wgpu::Buffer,
         counts: Option<&wgpu::Buffer>,
     ) -> Result<()> {
+        let (sorted_keys, sorted_values) = self.record_moving(recorder, keys, values, counts)?;
+        if sorted_keys == keys {
+            return Ok(());
+        }
+        let (from, to) = (Ends { keys: sorted_keys, values: sorted_values }, Ends { keys, values });
+        let counts = counts.unwrap_or(&self.no_counts);
+        self.dispatch(recorder, &self.passes.copy, &self.binds(0, counts, from, to))
+    }
+
+    /// Like [`Sort::record`], and saves its last copy: when it has run, the sorted keys and values lie in the buffers
+    /// that it returns. They are the given ones when the number of digits (of up to 8 bits, none over two words) is
+    /// even, else the sort's own scratch, good until it runs again.
+    ///
+    /// # Errors
+    /// As for [`Sort::record`].
+    pub fn record_moving<'a>(
+        &'a self,
+        recorder: &mut Recorder,
+        keys: &'a wgpu::Buffer,
+        values: &'a wgpu::Buffer,
+        counts: Option<&wgpu::Buffer>,
+    ) -> Result<(&'a wgpu::Buffer, &'a wgpu::Buffer)> {
         let counts = match (counts, &self.args) {
             (Some(counts), _) => counts,
             (None, Some(_)) => return Err(no_counts("Sort")),
@@ -239,8 +273,7 @@ impl Sort {
         if let Some(args) = &self.args {
             args.record(recorder, counts)?;
         }
-        let own = Ends { keys: &self.keys, values: &self.values };
-        let (mut from, mut to) = (Ends { keys, values }, own);
+        let (mut from, mut to) = (Ends { keys, values }, Ends { keys: &self.keys, values: &self.values });
         for step in 0..self.digits.len() {
             let [params, counted, keys_in, ..] = self.binds(step, counts, from, to);
             let histogram = Bind::new("histogram", &self.histogram);
@@ -251,10 +284,7 @@ impl Sort {
             self.dispatch(recorder, &self.passes.scatter, &[a, b, c, d, e, f, histogram])?;
             (from, to) = (to, from);
         }
-        if from == own {
-            self.dispatch(recorder, &self.passes.copy, &self.binds(0, counts, from, to))?;
-        }
-        Ok(())
+        Ok((from.keys, from.values))
     }
 
     fn binds<'a>(&'a self, step: usize, counts: &'a wgpu::Buffer, from: Ends<'a>, to: Ends<'a>) -> [Bind<'a>; 6] {
