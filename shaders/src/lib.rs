@@ -20,6 +20,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("narrowphase/cuboid_cuboid", include_str!("../narrowphase/cuboid_cuboid.wgsl")),
     ("narrowphase/cuboid_halfspace", include_str!("../narrowphase/cuboid_halfspace.wgsl")),
     ("primitives/args", include_str!("../primitives/args.wgsl")),
+    ("primitives/compact", include_str!("../primitives/compact.wgsl")),
     ("primitives/scan", include_str!("../primitives/scan.wgsl")),
     ("primitives/sort", include_str!("../primitives/sort.wgsl")),
     ("primitives/sort_subgroup", include_str!("../primitives/sort_subgroup.wgsl")),
