@@ -12,13 +12,13 @@ use crate::shared::Shared;
 
 /// Up to so many elements, insertion sort.
 const FEW: usize = 48;
-/// Up to so many elements, one thread sorts from the least significant digit on.
-const MANY: usize = 1 << 14;
+/// Up to so many elements, one thread sorts from the least significant digit on, though there are others.
+const ALONE: usize = 1 << 15;
+/// Up to so many elements it does so when there are no others, or they have buckets of their own.
+const MANY: usize = 1 << 17;
 /// Elements a bucket, when keys are spread evenly.
 const BUCKET: usize = 1 << 12;
-/// Most bits by which elements are split at once.
-const SPLIT_BITS: u32 = 8;
-/// Bits of a digit within a bucket.
+/// Bits of a digit, and most bits by which elements are split at once.
 const DIGIT_BITS: u32 = 8;
 const DIGITS: usize = 1 << DIGIT_BITS;
 /// Elements that a thread takes at least when keys are only read.
@@ -43,10 +43,13 @@ pub fn radix_sort_by<T: Copy + Send + Sync>(
         return;
     }
     scratch.resize(elements.len(), elements[0]);
-    let mask = u64::MAX >> (64 - (bits.end - bits.start));
-    let start = bits.start;
-    let key = move |element: &T| (key(element) >> start) & mask;
-    sort(elements, scratch, Where::From, &key);
+    sort(elements, scratch, bits, Where::From, &key);
+}
+
+/// The bits `bits` of a key, not shifted, all others zero.
+fn masked<T>(bits: &Range<u32>, key: &impl Fn(&T) -> u64) -> impl Fn(&T) -> u64 {
+    let mask = (u64::MAX >> (64 - (bits.end - bits.start))) << bits.start;
+    move |element| key(element) & mask
 }
 
 /// Where the sorted elements are to lie.
@@ -56,20 +59,47 @@ enum Where {
     To,
 }
 
-/// Sorts what lies in `from`; both slices are as long.
-fn sort<T: Copy + Send + Sync>(from: &mut [T], to: &mut [T], end: Where, key: &(impl Fn(&T) -> u64 + Sync)) {
+/// Sorts what lies in `from`; both slices are as long, and `bits` are some.
+fn sort<T: Copy + Send + Sync>(
+    from: &mut [T],
+    to: &mut [T],
+    bits: Range<u32>,
+    end: Where,
+    key: &(impl Fn(&T) -> u64 + Sync),
+) {
     if from.len() <= FEW {
-        insertion_sort(from, key);
+        insertion_sort(from, &masked(&bits, key));
         return finish(from, to, end);
     }
-    let found = look(from, key);
+    let found = look(from, &masked(&bits, key));
     if found.is_sorted {
         return finish(from, to, end);
     }
     // Not sorted, so that some bit differs.
     let differ = found.any & !found.all;
     let bits = differ.trailing_zeros()..64 - differ.leading_zeros();
-    if from.len() <= MANY { by_digits(from, to, bits, end, key) } else { split(from, to, bits, end, key) }
+    let alone = if rayon::current_num_threads() > 1 { ALONE } else { MANY };
+    if from.len() <= alone { by_digits(from, to, bits, end, key) } else { split(from, to, bits, end, key) }
+}
+
+/// Sorts a bucket, whose keys differ in no other bits than `bits`.
+fn sort_bucket<T: Copy + Send + Sync>(
+    from: &mut [T],
+    to: &mut [T],
+    bits: Range<u32>,
+    end: Where,
+    key: &(impl Fn(&T) -> u64 + Sync),
+) {
+    if bits.is_empty() {
+        finish(from, to, end);
+    } else if from.len() <= FEW {
+        insertion_sort(from, &masked(&bits, key));
+        finish(from, to, end);
+    } else if from.len() <= MANY {
+        by_digits(from, to, bits, end, key);
+    } else {
+        sort(from, to, bits, end, key);
+    }
 }
 
 /// Moves the sorted elements from where they are, `from`, to where they are to lie.
@@ -121,41 +151,113 @@ fn look<T: Sync>(elements: &[T], key: &(impl Fn(&T) -> u64 + Sync)) -> Look {
     found
 }
 
-/// One thread, least significant digit first; `bits` are those that differ.
-fn by_digits<T: Copy>(from: &mut [T], to: &mut [T], bits: Range<u32>, end: Where, key: &impl Fn(&T) -> u64) {
-    let width = bits.end - bits.start;
-    let digits = width.div_ceil(DIGIT_BITS);
-    let each = width.div_ceil(digits);
-    let mut counters = [[0u32; DIGITS]; 64usize.div_ceil(DIGIT_BITS as usize)];
-    let mask = (1usize << each) - 1;
-    for element in from.iter() {
-        let mut rest = key(element) >> bits.start;
-        for counters in &mut counters[..digits as usize] {
-            counters[rest as usize & mask] += 1;
-            rest >>= each;
-        }
+/// A digit: bits of a key.
+#[derive(Clone, Copy)]
+struct Digit {
+    shift: u32,
+    mask: u8,
+}
+
+impl Digit {
+    /// The lowest digit of `bits`, which are some.
+    fn lowest(bits: &Range<u32>) -> Self {
+        Self { shift: bits.start, mask: u8::MAX >> (DIGIT_BITS.saturating_sub(bits.end - bits.start)) }
     }
+
+    fn of(self, key: u64) -> usize {
+        ((key >> self.shift) as u8 & self.mask).into()
+    }
+}
+
+/// One thread, least significant digit first; `bits` are some.
+fn by_digits<T: Copy>(from: &mut [T], to: &mut [T], bits: Range<u32>, end: Where, key: &impl Fn(&T) -> u64) {
+    let digit_at = |start: u32| Digit::lowest(&(start..bits.end));
     let (mut at, mut other, mut is_here) = (from, to, Where::From);
-    for (digit, counters) in (0..).zip(&mut counters[..digits as usize]) {
-        let shift = bits.start + digit * each;
-        let digit_of = |element: &T| (key(element) >> shift) as usize & mask;
-        if counters[digit_of(&at[0])] as usize == at.len() {
-            continue;
+    let mut counters = [0; DIGITS];
+    count(at, digit_at(bits.start), &mut counters, key);
+    for start in bits.clone().step_by(DIGIT_BITS as usize) {
+        let digit = digit_at(start);
+        let next = (start + DIGIT_BITS < bits.end).then(|| digit_at(start + DIGIT_BITS));
+        let mut next_counters = [0; DIGITS];
+        if counters[digit.of(key(&at[0]))] as usize == at.len() {
+            if let Some(next) = next {
+                count(at, next, &mut next_counters, key);
+            }
+        } else {
+            by_digit(at, other, digit, &mut counters, next.unwrap_or(digit), &mut next_counters, key);
+            (at, other) = (other, at);
+            is_here = if is_here == Where::From { Where::To } else { Where::From };
         }
-        let mut sum = 0;
-        for counter in &mut counters[..=mask] {
-            sum += std::mem::replace(counter, sum);
-        }
-        for element in at.iter() {
-            let counter = &mut counters[digit_of(element)];
-            other[*counter as usize] = *element;
-            *counter += 1;
-        }
-        (at, other) = (other, at);
-        is_here = if is_here == Where::From { Where::To } else { Where::From };
+        counters = next_counters;
     }
     if is_here != end {
         other.copy_from_slice(at);
+    }
+}
+
+/// Adds up how often each value of a digit occurs.
+fn count<T>(from: &[T], digit: Digit, counters: &mut [u32; DIGITS], key: &impl Fn(&T) -> u64) {
+    for element in from {
+        counters[digit.of(key(element))] += 1;
+    }
+}
+
+/// Moves the elements by one digit, which `counters` counts, and counts the next one meanwhile.
+fn by_digit<T: Copy>(
+    from: &[T],
+    to: &mut [T],
+    digit: Digit,
+    counters: &mut [u32; DIGITS],
+    next: Digit,
+    next_counters: &mut [u32; DIGITS],
+    key: &impl Fn(&T) -> u64,
+) {
+    let mut sum = 0;
+    for counter in counters.iter_mut() {
+        sum += std::mem::replace(counter, sum);
+    }
+    let eights = from.chunks_exact(8);
+    let rest = eights.remainder();
+    for eight in eights {
+        // All keys first: what is read does not wait for what is written.
+        let keys: [u64; 8] = std::array::from_fn(|i| key(&eight[i]));
+        for (key, element) in keys.into_iter().zip(eight) {
+            next_counters[next.of(key)] += 1;
+            let place = &mut counters[digit.of(key)];
+            to[*place as usize] = *element;
+            *place += 1;
+        }
+    }
+    for element in rest {
+        next_counters[next.of(key(element))] += 1;
+        let place = &mut counters[digit.of(key(element))];
+        to[*place as usize] = *element;
+        *place += 1;
+    }
+}
+
+/// The places that are left for a chunk's elements of one bucket.
+#[derive(Clone, Copy, Default)]
+struct Places {
+    next: usize,
+    end: usize,
+}
+
+/// Moves a chunk's elements to their places.
+fn move_to_buckets<T: Copy>(
+    elements: &[T],
+    target: &Shared<T>,
+    ranges: &mut [Places; DIGITS],
+    digit: Digit,
+    key: &impl Fn(&T) -> u64,
+) {
+    for element in elements {
+        let places = &mut ranges[digit.of(key(element))];
+        assert!(places.next < places.end, "a key changed while its element was sorted");
+        // SAFETY: the ranges of chunks and buckets do not overlap, each place of one is taken once, and nobody reads
+        // before all have ended.
+        unsafe { target.set(places.next, *element) };
+        places.next += 1;
     }
 }
 
@@ -167,52 +269,42 @@ fn split<T: Copy + Send + Sync>(
     end: Where,
     key: &(impl Fn(&T) -> u64 + Sync),
 ) {
-    let count = from.len();
-    let wanted = (count / BUCKET).ilog2().clamp(1, SPLIT_BITS);
-    let shift = bits.end - wanted.min(bits.end - bits.start);
-    // Bits above those that differ are the same in all keys.
-    let mask = (1usize << (bits.end - shift)) - 1;
-    let bucket_of = |element: &T| (key(element) >> shift) as usize & mask;
+    // As many buckets as are wanted, or more when that saves a digit.
+    let width = bits.end - bits.start;
+    let digits_left = width.saturating_sub(DIGIT_BITS).div_ceil(DIGIT_BITS);
+    let wanted = (from.len() / BUCKET).ilog2().clamp(1, DIGIT_BITS).max(width.saturating_sub(DIGIT_BITS * digits_left));
+    let shift = bits.end - wanted.min(width);
+    let digit = Digit::lowest(&(shift..bits.end));
 
-    let threads = rayon::current_num_threads();
-    let chunk = count.div_ceil(threads).max(READ);
-    let mut counts: Vec<Vec<usize>> = from
+    let chunk = from.len().div_ceil(rayon::current_num_threads()).max(READ);
+    let counts: Vec<[u32; DIGITS]> = from
         .par_chunks(chunk)
         .map(|elements| {
-            let mut counts = vec![0; mask + 1];
-            for element in elements {
-                counts[bucket_of(element)] += 1;
-            }
+            let mut counts = [0; DIGITS];
+            count(elements, digit, &mut counts, key);
             counts
         })
         .collect();
 
-    // Where each chunk's elements of each bucket go: (next, end).
-    let mut sizes = vec![0; mask + 1];
-    let mut ranges = vec![vec![(0, 0); mask + 1]; counts.len()];
+    // Where each chunk's elements of each bucket go.
+    let mut sizes = [0; DIGITS];
+    let mut ranges = vec![[Places::default(); DIGITS]; counts.len()];
     let mut next = 0;
-    for bucket in 0..=mask {
-        let begin = next;
-        for (counts, ranges) in counts.iter_mut().zip(&mut ranges) {
-            ranges[bucket] = (next, next + counts[bucket]);
-            next += counts[bucket];
+    for bucket in 0..DIGITS {
+        for (counts, ranges) in counts.iter().zip(&mut ranges) {
+            let end = next + counts[bucket] as usize;
+            ranges[bucket] = Places { next, end };
+            sizes[bucket] += counts[bucket] as usize;
+            next = end;
         }
-        sizes[bucket] = next - begin;
     }
 
     let target = Shared::new(to);
-    from.par_chunks(chunk).zip(&mut ranges).for_each(|(elements, ranges)| {
-        for element in elements {
-            let (next, end) = &mut ranges[bucket_of(element)];
-            assert!(next < end, "a key changed while its element was sorted");
-            // SAFETY: the ranges of chunks and buckets do not overlap, each place of one is written once, and nobody
-            // reads before all have ended.
-            unsafe { target.set(*next, *element) };
-            *next += 1;
-        }
-    });
+    from.par_chunks(chunk)
+        .zip(ranges)
+        .for_each(|(elements, mut ranges)| move_to_buckets(elements, &target, &mut ranges, digit, key));
 
-    let mut parts = Vec::with_capacity(sizes.len());
+    let mut parts = Vec::with_capacity(DIGITS);
     let (mut from, mut to) = (from, to);
     for size in sizes {
         let (from_part, from_rest) = from.split_at_mut(size);
@@ -221,7 +313,7 @@ fn split<T: Copy + Send + Sync>(
         (from, to) = (from_rest, to_rest);
     }
     let other = if end == Where::From { Where::To } else { Where::From };
-    parts.into_par_iter().for_each(|(from, to)| sort(from, to, other, key));
+    parts.into_par_iter().for_each(|(from, to)| sort_bucket(from, to, bits.start..shift, other, key));
 }
 
 #[cfg(test)]
