@@ -122,12 +122,7 @@ impl Sort {
     ///
     /// # Errors
     /// [`Error::Invalid`] for sub-group ranking on a device without sub-group operations; as for [`Sort::new`].
-    pub fn with_ranking(
-        gpu: &Gpu,
-        pipelines: &mut Pipelines,
-        options: SortOptions,
-        ranking: Ranking,
-    ) -> Result<Self> {
+    pub fn with_ranking(gpu: &Gpu, pipelines: &mut Pipelines, options: SortOptions, ranking: Ranking) -> Result<Self> {
         let scatter = match ranking {
             Ranking::Portable => "primitives/sort",
             Ranking::Subgroup if gpu.has_subgroups() => "primitives/sort_subgroup",
@@ -164,8 +159,9 @@ impl Sort {
         let mut sort = Self {
             passes,
             params: gpu.create_buffer("sort params", steps * UNIFORM_STEP, uniform)?,
-            keys: gpu.create_buffer("sort keys", elements * words * 4, storage)?,
-            values: gpu.create_buffer("sort values", elements * 4, storage)?,
+            // The result may stay here, to be copied by the caller.
+            keys: gpu.create_buffer("sort keys", elements * words * 4, storage | BufferUsages::COPY_SRC)?,
+            values: gpu.create_buffer("sort values", elements * 4, storage | BufferUsages::COPY_SRC)?,
             histogram: gpu.create_buffer(
                 "sort histogram",
                 u64::from(capacity.div_ceil(BLOCK)) * u64::from(radix) * 4,
