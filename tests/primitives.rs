@@ -102,8 +102,7 @@ fn check_compact(
 ) {
     let options = CompactOptions { capacity: size + 2, count, kept: 6 };
     let compaction = Compact::new(gpu(), pipelines, options).unwrap();
-    let [gpu_flags, kept, counts] =
-        [flags, &vec![UNTOUCHED; flags.len()], &counts_with(count, size)].map(|words| upload(words));
+    let [gpu_flags, kept, counts] = [flags, &vec![UNTOUCHED; flags.len()], &counts_with(count, size)].map(upload);
     let gpu_values = values.map(upload);
     run(|recorder| compaction.record(recorder, &gpu_flags, gpu_values.as_ref(), &kept, &counts).unwrap());
 

@@ -43,7 +43,9 @@ pub fn radix_sort_by<T: Copy + Send + Sync>(
         return;
     }
     scratch.resize(elements.len(), elements[0]);
-    sort(elements, scratch, bits, Where::From, &key);
+    if sort(elements, scratch, bits, None, &key) == Where::To {
+        std::mem::swap(elements, scratch);
+    }
 }
 
 /// The bits `bits` of a key, not shifted, all others zero.
@@ -52,21 +54,28 @@ fn masked<T>(bits: &Range<u32>, key: &impl Fn(&T) -> u64) -> impl Fn(&T) -> u64 
     move |element| key(element) & mask
 }
 
-/// Where the sorted elements are to lie.
+/// Where the sorted elements lie.
 #[derive(Clone, Copy, PartialEq)]
 enum Where {
     From,
     To,
 }
 
-/// Sorts what lies in `from`; both slices are as long, and `bits` are some.
+impl Where {
+    fn other(self) -> Self {
+        if self == Self::From { Self::To } else { Self::From }
+    }
+}
+
+/// Sorts what lies in `from`, and returns where the result lies: at `end`, if that is told. Both slices are as long, and
+/// `bits` are some.
 fn sort<T: Copy + Send + Sync>(
     from: &mut [T],
     to: &mut [T],
     bits: Range<u32>,
-    end: Where,
+    end: Option<Where>,
     key: &(impl Fn(&T) -> u64 + Sync),
-) {
+) -> Where {
     if from.len() <= FEW {
         insertion_sort(from, &masked(&bits, key));
         return finish(from, to, end);
@@ -91,22 +100,20 @@ fn sort_bucket<T: Copy + Send + Sync>(
     key: &(impl Fn(&T) -> u64 + Sync),
 ) {
     if bits.is_empty() {
-        finish(from, to, end);
-    } else if from.len() <= FEW {
-        insertion_sort(from, &masked(&bits, key));
-        finish(from, to, end);
-    } else if from.len() <= MANY {
-        by_digits(from, to, bits, end, key);
+        finish(from, to, Some(end));
+    } else if from.len() > FEW && from.len() <= MANY {
+        by_digits(from, to, bits, Some(end), key);
     } else {
-        sort(from, to, bits, end, key);
+        sort(from, to, bits, Some(end), key);
     }
 }
 
-/// Moves the sorted elements from where they are, `from`, to where they are to lie.
-fn finish<T: Copy>(from: &mut [T], to: &mut [T], end: Where) {
-    if end == Where::To {
+/// The sorted elements lie in `from`: copies them if they are to lie elsewhere.
+fn finish<T: Copy>(from: &mut [T], to: &mut [T], end: Option<Where>) -> Where {
+    if end == Some(Where::To) {
         to.copy_from_slice(from);
     }
+    end.unwrap_or(Where::From)
 }
 
 fn insertion_sort<T: Copy>(elements: &mut [T], key: &impl Fn(&T) -> u64) {
@@ -170,7 +177,13 @@ impl Digit {
 }
 
 /// One thread, least significant digit first; `bits` are some.
-fn by_digits<T: Copy>(from: &mut [T], to: &mut [T], bits: Range<u32>, end: Where, key: &impl Fn(&T) -> u64) {
+fn by_digits<T: Copy>(
+    from: &mut [T],
+    to: &mut [T],
+    bits: Range<u32>,
+    end: Option<Where>,
+    key: &impl Fn(&T) -> u64,
+) -> Where {
     let digit_at = |start: u32| Digit::lowest(&(start..bits.end));
     let (mut at, mut other, mut is_here) = (from, to, Where::From);
     let mut counters = [0; DIGITS];
@@ -186,13 +199,14 @@ fn by_digits<T: Copy>(from: &mut [T], to: &mut [T], bits: Range<u32>, end: Where
         } else {
             by_digit(at, other, digit, &mut counters, next.unwrap_or(digit), &mut next_counters, key);
             (at, other) = (other, at);
-            is_here = if is_here == Where::From { Where::To } else { Where::From };
+            is_here = is_here.other();
         }
         counters = next_counters;
     }
-    if is_here != end {
+    if end.is_some_and(|end| end != is_here) {
         other.copy_from_slice(at);
     }
+    end.unwrap_or(is_here)
 }
 
 /// Adds up how often each value of a digit occurs.
@@ -266,9 +280,9 @@ fn split<T: Copy + Send + Sync>(
     from: &mut [T],
     to: &mut [T],
     bits: Range<u32>,
-    end: Where,
+    end: Option<Where>,
     key: &(impl Fn(&T) -> u64 + Sync),
-) {
+) -> Where {
     // As many buckets as are wanted, or more when that saves a digit.
     let width = bits.end - bits.start;
     let digits_left = width.saturating_sub(DIGIT_BITS).div_ceil(DIGIT_BITS);
@@ -312,8 +326,10 @@ fn split<T: Copy + Send + Sync>(
         parts.push((to_part, from_part));
         (from, to) = (from_rest, to_rest);
     }
-    let other = if end == Where::From { Where::To } else { Where::From };
-    parts.into_par_iter().for_each(|(from, to)| sort_bucket(from, to, bits.start..shift, other, key));
+    // Each digit that is left moves the elements once more, from `to` at first.
+    let end = end.unwrap_or(if digits_left % 2 == 1 { Where::From } else { Where::To });
+    parts.into_par_iter().for_each(|(from, to)| sort_bucket(from, to, bits.start..shift, end.other(), key));
+    end
 }
 
 #[cfg(test)]
