@@ -21,8 +21,8 @@ const BUCKET: usize = 1 << 12;
 /// Bits of a digit, and most bits by which elements are split at once.
 const DIGIT_BITS: u32 = 8;
 const DIGITS: usize = 1 << DIGIT_BITS;
-/// Elements that a thread takes at least when keys are only read.
-const READ: usize = 1 << 15;
+/// Fewest elements of a chunk that a thread takes.
+const READ: usize = 1 << 14;
 
 /// Sorts `elements` by the bits `bits` of `key` (0 the least significant), in place and in parallel; elements of equal
 /// bits keep their order. The result is the same for any number of threads.
@@ -290,7 +290,10 @@ fn split<T: Copy + Send + Sync>(
     let shift = bits.end - wanted.min(width);
     let digit = Digit::lowest(&(shift..bits.end));
 
-    let chunk = from.len().div_ceil(rayon::current_num_threads()).max(READ);
+    // Several chunks a thread, so that one which is held up does not hold up the others.
+    let threads = rayon::current_num_threads();
+    let chunks = if threads == 1 { 1 } else { 4 * threads };
+    let chunk = from.len().div_ceil(chunks).max(READ);
     let counts: Vec<[u32; DIGITS]> = from
         .par_chunks(chunk)
         .map(|elements| {
