@@ -7,14 +7,9 @@ mod cloud;
 use cloud::Cloud;
 use parry3d::bounding_volume;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy};
-use tumble_core::glam::{Quat, Vec3};
 use tumble_core::layout::{Aabb, StepParams, aabb_body, tree_members};
 use tumble_core::scenes::{Crowd, crowd};
-use tumble_core::{
-    Broadphase, ColliderBuilder, MortonBits, Params, Pose, RigidBodyBuilder, RigidBodyType, Scene, StepReport,
-    Traversal, limits, measures, scenes,
-};
-use tumble_cpu::World;
+use tumble_core::{MortonBits, Traversal, limits};
 use tumble_cpu::bounds::{FAR, size_class};
 use tumble_cpu::broadphase::{Boxes, Found, bounded, brute_force, grid, lbvh, matter};
 
@@ -215,71 +210,6 @@ fn a_hundred_thousand_bodies() {
         if kind == Crowd::Uniform {
             same(&what, &[("brute force".into(), brute_force::find_pairs(&boxes, u32::MAX))], &pairs);
             same(&what, &grids(&boxes, &cloud.step, &[grid::Large::List], u32::MAX), &pairs);
-        }
-    }
-}
-
-fn choices() -> Vec<Params> {
-    let kinds = [
-        Broadphase::Auto,
-        Broadphase::BruteForce,
-        Broadphase::Grid,
-        Broadphase::SlicedGrid,
-        Broadphase::Lbvh,
-        Broadphase::SweepAndPrune,
-    ];
-    let mut all: Vec<_> = kinds.map(|broadphase| Params { broadphase, ..Params::default() }).into();
-    for traversal in TRAVERSALS {
-        for morton_bits in BITS {
-            all.push(Params { broadphase: Broadphase::Lbvh, traversal, morton_bits, ..Params::default() });
-        }
-    }
-    all
-}
-
-/// Sixty steps of a scene with edits on the way: a body comes, one goes, a wall is moved, parameters change. The hash of
-/// all bits, and the pairs of the last step.
-fn run(scene: &Scene, params: Params) -> (u64, StepReport) {
-    let mut world = World::new(scene.clone(), params).unwrap();
-    let step = |world: &mut World, count| (0..count).for_each(|_| world.step().unwrap());
-    step(&mut world, 15);
-    let at = Vec3::new(0.3, 4.0, -0.2);
-    let ball = RigidBodyBuilder::dynamic().translation(at).linvel(Vec3::NEG_Y * 3.0);
-    world.edit().insert(ball, ColliderBuilder::ball(0.7).density(1000.0)).unwrap();
-    let wall = RigidBodyBuilder::fixed().translation(Vec3::Y);
-    let wall = world.edit().insert(wall, ColliderBuilder::cuboid(0.2, 1.0, 3.0)).unwrap().body;
-    step(&mut world, 10);
-    let body = |world: &World, kind| {
-        let scene = world.scene();
-        scene.bodies().find(|&b| scene.body(b).unwrap().body_type == kind).unwrap()
-    };
-    let gone = body(&world, RigidBodyType::Dynamic);
-    world.edit().remove(gone).unwrap();
-    step(&mut world, 10);
-    let turn = Quat::from_rotation_y(0.4);
-    world.edit().set_pose(wall, Pose { translation: Vec3::new(1.0, 0.8, 0.0), rotation: turn }).unwrap();
-    step(&mut world, 10);
-    let other = Params { speculative_distance: 0.05, dt: 1.0 / 100.0, ..*world.params() };
-    world.set_params(other).unwrap();
-    step(&mut world, 15);
-    let hash = measures::state_hash(&world.poses().unwrap(), &world.velocities().unwrap());
-    (hash, world.sync().unwrap())
-}
-
-/// The same bits, whatever finds the pairs. Oracle: the world with brute force.
-#[test]
-fn a_world_does_not_depend_on_its_broad_phase() {
-    let mut crowded = crowd(Crowd::Ratio(30.0), 200);
-    crowded.gravity = Vec3::NEG_Y;
-    for (name, scene) in [("pile", scenes::pile(150)), ("mixed", scenes::mixed(250)), ("crowd", crowded)] {
-        let (hash, expected) = run(&scene, Params { broadphase: Broadphase::BruteForce, ..Params::default() });
-        assert!(expected.contacts > 50, "{name}: {} contacts", expected.contacts);
-        for params in choices() {
-            let Params { broadphase, traversal, morton_bits, .. } = params;
-            let (found, report) = run(&scene, params);
-            let what = format!("{name}: {broadphase}, {traversal:?}, {morton_bits:?}");
-            assert_eq!((report.pairs, report.contacts), (expected.pairs, expected.contacts), "{what}");
-            assert_eq!(found, hash, "{what}");
         }
     }
 }

@@ -180,12 +180,19 @@ fn steady(kind: Crowd, count: usize, cloud: &mut Cloud, rounds: usize) -> Vec<Ro
     let (mut parry, _) = Parry::build(&first);
     let mut rapier = Rapier::new(&first, 1.0);
     rapier.first();
-    let step = cloud.step;
+    let (step, turns) = (cloud.step, std::cell::Cell::new(0));
     let mut runs: Vec<(&'static str, Box<dyn FnMut(&[Aabb]) -> Sample>)> = vec![
         ("grid, list", Box::new(move |f| ours::grid(f, &step, false, false))),
         ("grid, tree", Box::new(move |f| ours::grid(f, &step, false, true))),
         ("lbvh, built anew", Box::new(|f| anew.refit(f, true).0)),
-        ("lbvh, refitted", Box::new(|f| lbvh.refit(f, false).0)),
+        (
+            "lbvh, refitted",
+            Box::new(|f| {
+                let (sample, walked) = lbvh.refit(f, false);
+                turns.set(walked);
+                sample
+            }),
+        ),
         ("parry bvh, refitted", Box::new(|f| parry.refit(f))),
         (
             "rapier, update",
@@ -204,7 +211,16 @@ fn steady(kind: Crowd, count: usize, cloud: &mut Cloud, rounds: usize) -> Vec<Ro
         });
         (*what, run)
     });
-    contest(kind, count, rounds, contestants.collect())
+    let rows = contest(kind, count, rounds, contestants.collect());
+    let row = |what| rows.iter().find(|row: &&Row| row.what == what).expect("a row");
+    let (anew, refitted) = (row("lbvh, built anew"), row("lbvh, refitted"));
+    let a_turn = refitted.pairs / f64::from(turns.get());
+    let build = (anew.build - refitted.build) / a_turn / count as f64;
+    println!(
+        "  a build takes as long as {build:.0} turns a leaf; walks take {:.0}",
+        f64::from(turns.get()) / count as f64
+    );
+    rows
 }
 
 struct Settings {

@@ -12,6 +12,7 @@
 
 use super::{Boxes, Found, Query, Sink, bounded, center, collect, matter};
 use crate::bounds::FAR;
+use crate::primitives::radix_sort_by;
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 use tumble_core::layout::{Aabb, NO_NODE, TreeNode, aabb_body, root_of, tree_members};
@@ -119,19 +120,10 @@ impl Tree {
         let mut tree = Self::default();
         let quantizer = Quantizer::new(boxes, bits);
         let code = |i: u32| quantizer.code(&boxes.aabbs[i as usize]);
-        // The collider decides between equal codes.
-        (tree.codes, tree.members) = match bits {
-            MortonBits::Bits63 => {
-                let mut keys: Vec<(u64, u32)> = list.par_iter().map(|&i| (code(i), i)).collect();
-                keys.par_sort_unstable();
-                keys.into_par_iter().unzip()
-            }
-            _ => {
-                let mut keys: Vec<u64> = list.par_iter().map(|&i| code(i) << 32 | u64::from(i)).collect();
-                keys.par_sort_unstable();
-                keys.into_par_iter().map(|key| (key >> 32, key as u32)).unzip()
-            }
-        };
+        // The sort is stable, so that the lower collider comes first of equal codes.
+        let mut keys: Vec<(u64, u32)> = list.par_iter().with_min_len(1024).map(|&i| (code(i), i)).collect();
+        radix_sort_by(&mut keys, &mut Vec::new(), 0..3 * quantizer.bits, |key| key.0);
+        (tree.codes, tree.members) = keys.into_par_iter().with_min_len(4096).unzip();
         tree.link();
         tree.refit(boxes);
         tree
