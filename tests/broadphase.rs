@@ -159,6 +159,32 @@ fn refitted_trees_find_the_same() {
     }
 }
 
+/// Fixed boxes whose codes have one bit each, so that their tree is a chain of 62 nodes, each the left child of the next;
+/// and moving ones that meet them all. A short stack cannot hold what such a walk leaves aside. Oracle: brute force.
+#[test]
+fn a_tree_as_deep_as_its_codes_are_long() {
+    const HALF: f32 = (1 << 21) as f32;
+    let aabb_at = |i: u32, middle: [f32; 3], flags: u32| Aabb {
+        min: middle.map(|x| x - HALF),
+        body: i | aabb_body::LIVE | flags,
+        max: middle.map(|x| x + HALF),
+        class: size_class(2.0 * HALF),
+    };
+    let mut aabbs: Vec<Aabb> = (0..63u32)
+        .map(|bit| {
+            let axis = bit as usize % 3;
+            let middle = std::array::from_fn(|i| if i == axis { (1u32 << (bit / 3)) as f32 } else { 0.0 });
+            aabb_at(bit, middle, aabb_body::FIXED)
+        })
+        .collect();
+    aabbs.extend((63..70).map(|i| aabb_at(i, [(i - 63) as f32 * 7.0, 0.0, 0.0], aabb_body::DYNAMIC)));
+    let (boxes, pairs) = (Boxes::new(&aabbs), pairs_of(&aabbs));
+    assert_eq!(pairs.len(), 7 * 63 + 7 * 6 / 2);
+    let [moving, fixed] = trees(&boxes, MortonBits::Bits63);
+    assert!(fixed.codes.iter().enumerate().all(|(bit, code)| *code == 1 << bit));
+    same("a chain", &walks(&[moving, fixed], &boxes, u32::MAX), &pairs);
+}
+
 /// Beyond the most that was asked for, pairs are counted all the same.
 #[test]
 fn too_many_pairs_are_counted() {
