@@ -6,7 +6,7 @@
 //#import shared/step.wgsl
 //#import shared/thread.wgsl
 
-const UNBOUNDED_LIMIT: u32 = 8192u;
+const UNBOUNDED_LIMIT: u32 = 4096u;
 
 @group(0) @binding(0) var<uniform> step: StepParams;
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
