@@ -32,7 +32,7 @@ fn keep_pair(i: u32, j: u32) {
     }
 }
 
-// Without a loop: within a caller's loop, llvmpipe would count a turn of it at every turn, entered or not.
+// Without a loop: within a loop, llvmpipe may count a turn of another one at every turn, entered or not.
 fn write_kept() {
     if kept_count != 0u && atomicLoad(&counters[CONTROL_PAIR_COUNT]) < MOST_COUNTED {
         let first = atomicAdd(&counters[CONTROL_PAIR_COUNT], kept_count);
