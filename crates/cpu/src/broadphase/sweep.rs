@@ -13,9 +13,10 @@ use rayon::prelude::*;
 use std::ops::Range;
 use tumble_core::layout::Aabb;
 use tumble_core::limits::{SWEEP_CHUNK, SWEEP_ITEM_LIMIT};
+use wide::f32x8;
 
-/// Bytes of all arrays a collider: keys with colliders, boxes, ends, offsets.
-pub(super) const BYTES: u64 = 8 + size_of::<Aabb>() as u64 + 4 + 4;
+/// Bytes of all arrays a collider: keys with colliders, boxes and their sides, ends, offsets.
+pub(super) const BYTES: u64 = 12 + size_of::<Aabb>() as u64 + 16 + 4 + 4;
 
 /// Colliders along the axis.
 #[derive(Debug, Clone, Default)]
@@ -24,6 +25,8 @@ pub struct Sorted {
     pub keys: Vec<u32>,
     /// The boxes; the collider stands in `class`.
     pub boxes: Vec<Aabb>,
+    /// Their sides across the axis, lower and upper along the one and along the other, to compare many at once.
+    across: [Vec<f32>; 4],
 }
 
 /// Work by items: one for each place, then the extra ones.
@@ -76,11 +79,45 @@ pub fn sort(boxes: &Boxes, axis: usize) -> Sorted {
     let mut order: Vec<u64> = boxes.aabbs.par_iter().enumerate().with_min_len(2048).filter_map(with_key).collect();
     order.par_sort_unstable();
     let entry = |&both: &u64| Aabb { class: both as u32, ..boxes.aabbs[both as u32 as usize] };
-    Sorted {
-        keys: order.iter().map(|both| (both >> 32) as u32).collect(),
-        boxes: order.par_iter().with_min_len(2048).map(entry).collect(),
+    let keys = order.iter().map(|both| (both >> 32) as u32).collect();
+    let boxes: Vec<Aabb> = order.par_iter().with_min_len(2048).map(entry).collect();
+    let mut across = [const { Vec::new() }; 4];
+    across.par_iter_mut().enumerate().for_each(|(side, list)| {
+        let axis = (axis + 1 + side / 2) % 3;
+        *list = boxes.iter().map(|aabb| if side % 2 == 0 { aabb.min[axis] } else { aabb.max[axis] }).collect();
+    });
+    Sorted { keys, boxes, across }
+}
+
+impl Sorted {
+    /// Visits those of `candidates` whose boxes overlap the one at `place`.
+    fn partners(&self, axis: usize, place: usize, candidates: Range<usize>, mut visit: impl FnMut(&Aabb)) {
+        let own = &self.boxes[place];
+        let mut try_one = |other: &Aabb| {
+            if meets(own, other) {
+                visit(other);
+            }
+        };
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let [min_u, max_u, min_v, max_v] = [own.min[u], own.max[u], own.min[v], own.max[v]].map(f32x8::splat);
+        let mut next = candidates.start;
+        while next + LANES <= candidates.end {
+            let [low_u, high_u, low_v, high_v] =
+                [0, 1, 2, 3].map(|side| f32x8::from(&self.across[side][next..next + LANES]));
+            let apart = low_u.simd_gt(max_u) | min_u.simd_gt(high_u) | low_v.simd_gt(max_v) | min_v.simd_gt(high_v);
+            let mut near = !apart.to_bitmask() & ((1 << LANES) - 1);
+            while near != 0 {
+                try_one(&self.boxes[next + near.trailing_zeros() as usize]);
+                near &= near - 1;
+            }
+            next += LANES;
+        }
+        self.boxes[next..candidates.end].iter().for_each(try_one);
     }
 }
+
+/// Candidates that one comparison looks at.
+const LANES: usize = 8;
 
 /// For each place the first one that begins behind its end.
 pub fn ends(sorted: &Sorted, axis: usize) -> Vec<u32> {
@@ -138,11 +175,7 @@ pub fn find_pairs(boxes: &Boxes, most: u32) -> Found {
                 sink.with_list(boxes, &boxes.unbounded, own.class);
             }
             sink.took(candidates.len() as u32);
-            for other in &sorted.boxes[candidates] {
-                if meets(own, other) {
-                    sink.push(own.class, other.class);
-                }
-            }
+            sorted.partners(axis, place, candidates, |other| sink.push(own.class, other.class));
         }
     })
 }
