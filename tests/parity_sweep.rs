@@ -1,20 +1,29 @@
 //! Stage `broadphase/sweep`: the CPU finds what brute force finds, and the GPU computes what the CPU does, pass by pass,
 //! in every order of invocations. Oracles: brute force, and the mirror.
 
+#[allow(dead_code, reason = "some passes want an index")]
+#[path = "common/alone.rs"]
+mod alone;
 mod common;
 #[path = "common/crowds.rs"]
 mod crowds;
 #[path = "common/random.rs"]
 mod random;
 
+use alone::Alone;
+use bytemuck::Zeroable;
 use crowds::{boxed, crowds};
-use random::Random;
+use random::{Random, step_of};
 use tumble_core::glam::Vec3;
 use tumble_core::layout::*;
 use tumble_core::limits::{SWEEP_CHUNK, SWEEP_ITEM_LIMIT};
 use tumble_cpu::bounds::{FAR, size_class};
 use tumble_cpu::broadphase::sweep::{self, Items, Sorted};
 use tumble_cpu::broadphase::{Boxes, TooMany, brute_force, too_many};
+use tumble_gpu::primitives::{Count, Scan, ScanOptions, Sort, SortOptions};
+
+const PERMUTATIONS: [u32; 3] = [0, 1, 2];
+const GARBAGE: u32 = 0xdead_beef;
 
 /// The crowds of all broad phases, and such as a sweep finds hard.
 fn hard_crowds() -> Vec<(String, Vec<Aabb>)> {
@@ -134,4 +143,133 @@ fn more_work_than_may_be_is_refused() {
     let found = sweep::find_pairs(&boxes, 10);
     assert!(found.items > SWEEP_ITEM_LIMIT.into());
     assert_eq!(too_many(&boxes, &found), Some(TooMany::Items(found.items)));
+}
+
+fn to_ordered(x: f32) -> u32 {
+    if x.to_bits() >> 31 == 0 { x.to_bits() | 1 << 31 } else { !x.to_bits() }
+}
+
+/// Fills in what the passes bind, and makes the sort and the scan between them.
+fn prepare(alone: &mut Alone, boxes: &Boxes, step: &StepParams, control: &Control) -> (Sort, Scan) {
+    let count = boxes.aabbs.len();
+    let [center_min, center_max] = [boxes.low.map(to_ordered), boxes.high.map(to_ordered)];
+    alone.put("step", &[*step]);
+    alone.put("counters", &[Control { center_min, center_max, ..*control }]);
+    alone.put("aabbs", boxes.aabbs);
+    alone.put("sweep_state", &[GARBAGE; 16]);
+    for name in ["sweep_keys", "sweep_order", "sweep_ends", "sweep_offsets"] {
+        alone.put(name, &vec![GARBAGE; count]);
+    }
+    alone.put("sweep_boxes", &vec![[GARBAGE; 8]; count]);
+    alone.put("sweep_args", &[GARBAGE; 4]);
+    let gpu = common::gpu();
+    let by_place = SortOptions { capacity: count as u32, count: Count::Host(count as u32), bits: vec![32] };
+    let offsets = ScanOptions { capacity: count as u32, count: Count::Host(count as u32), total: None };
+    (
+        Sort::new(gpu, &mut alone.pipelines, by_place).unwrap(),
+        Scan::new(gpu, &mut alone.pipelines, offsets).unwrap(),
+    )
+}
+
+/// All passes of the sweep, one after the other.
+fn run_sweep(alone: &mut Alone, boxes: &Boxes, step: &StepParams, control: &Control) -> Control {
+    let (sort, scan) = prepare(alone, boxes, step, control);
+    let buffer = |name: &str| alone.buffers.buffer(name).unwrap().clone();
+    let [keys, order, offsets] = ["sweep_keys", "sweep_order", "sweep_offsets"].map(buffer);
+    let by_collider = (boxes.aabbs.len() as u32).div_ceil(256) + 1;
+    alone.run(|chain| {
+        let stem = "broadphase/sweep";
+        chain.pass(stem, "begin", 1);
+        chain.pass(stem, "spread", by_collider);
+        chain.pass(stem, "keys", by_collider);
+        sort.record(&mut chain.recorder, &keys, &order, None).unwrap();
+        chain.pass(stem, "ends", by_collider);
+        scan.record(&mut chain.recorder, &offsets, None).unwrap();
+        chain.pass(stem, "deal", 1);
+    });
+    alone.take("counters")[0]
+}
+
+#[test]
+fn the_gpu_sorts_and_deals_as_the_cpu_does() {
+    for (name, aabbs) in hard_crowds() {
+        let boxes = Boxes::new(&aabbs);
+        let (axis, sorted, ends, items) = passes(&boxes);
+        let step = step_of(aabbs.len() as u32);
+        for permute in PERMUTATIONS {
+            let mut alone = Alone::new(permute);
+            let control = run_sweep(&mut alone, &boxes, &step, &Control::zeroed());
+            let what = format!("{name}, permuted {permute}");
+            let held = ends.len();
+            let state: Vec<u32> = alone.take("sweep_state");
+            let axis_there = if aabbs.is_empty() { 0 } else { state[1] };
+            assert_eq!((state[0], axis_there), (held as u32, axis as u32), "{what}");
+            assert_eq!([state[2], state[3]], [items.count as u32, 0], "{what}: items");
+            assert!(alone.take::<u32>("sweep_keys")[..held] == sorted.keys, "{what}: keys");
+            assert!(alone.take::<Aabb>("sweep_boxes")[..held] == sorted.boxes, "{what}: boxes");
+            assert!(alone.take::<u32>("sweep_ends")[..held] == ends, "{what}: ends");
+            assert!(alone.take::<u32>("sweep_offsets")[..held] == items.offsets, "{what}: offsets");
+            assert_eq!(alone.take::<u32>("sweep_args")[..3], [items.count.div_ceil(256) as u32, 1, 1], "{what}");
+            assert_eq!([control.stop, control.overflow, control.needed], [0; 3], "{what}");
+        }
+    }
+}
+
+#[test]
+fn sums_do_not_wrap() {
+    // Nine of ten at the upper end along x, half of them along y: the squares along x pass 2^32.
+    let place = |i: u32| 0.4995 * Vec3::new((i % 10).min(1) as f32, (i % 2) as f32, 0.0) * 2.0;
+    let crowd: Vec<_> = (0..1_400_000).map(|i| boxed(place(i), Vec3::splat(0.1), i)).collect();
+    let boxes = Boxes::new(&crowd);
+    assert_eq!(sweep::axis(&boxes), 1);
+    for permute in PERMUTATIONS {
+        let mut alone = Alone::new(permute);
+        prepare(&mut alone, &boxes, &step_of(crowd.len() as u32), &Control::zeroed());
+        alone.run(|chain| {
+            let groups = (crowd.len() as u32).div_ceil(256);
+            chain.pass("broadphase/sweep", "begin", 1);
+            chain.pass("broadphase/sweep", "spread", groups);
+            chain.pass("broadphase/sweep", "keys", groups);
+        });
+        let state: Vec<u32> = alone.take("sweep_state");
+        let squares = 63 * 63 * 1_260_000u64;
+        assert_eq!(u64::from(state[8]) | u64::from(state[12]) << 32, squares);
+        assert_eq!(state[..2], [1_400_000, 1]);
+    }
+}
+
+#[test]
+fn the_gpu_refuses_as_much_work_as_the_cpu_does() {
+    let raised = |c: &Control| [c.overflow, c.needed];
+    let crowd = vec![boxed(Vec3::ZERO, Vec3::splat(0.5), 0); 372_000];
+    let boxes = Boxes::new(&crowd);
+    let items = sweep::find_pairs(&boxes, 10).items as u32;
+    let step = StepParams { pair_capacity: 10, ..step_of(crowd.len() as u32) };
+    let mut alone = Alone::new(0);
+    let control = run_sweep(&mut alone, &boxes, &step, &Control::zeroed());
+    assert_eq!(raised(&control), [overflow::SWEEP, items]);
+    assert_eq!(alone.take::<u32>("sweep_args")[..3], [0, 1, 1]);
+    // A step after one that stopped changes nothing of what that one said.
+    let before = Control { stop: 1, overflow: overflow::LAST_BATCH, needed: 77, ..Control::zeroed() };
+    let control = run_sweep(&mut alone, &boxes, &step, &before);
+    assert_eq!(raised(&control), [overflow::LAST_BATCH, 77]);
+    assert_eq!(alone.take::<u32>("sweep_args")[..3], [0, 1, 1]);
+    // More than a word counts: half of the square of their number, by 256.
+    let count = 1_500_000;
+    let crowd = vec![crowd[0]; count];
+    let step = StepParams { pair_capacity: 10, ..step_of(count as u32) };
+    let boxes = Boxes::new(&crowd);
+    prepare(&mut alone, &boxes, &step, &Control::zeroed());
+    let mut state = [0; 16];
+    state[0] = count as u32;
+    alone.put("sweep_state", &state);
+    alone.put("sweep_keys", &vec![to_ordered(-0.5); count]);
+    alone.put("sweep_order", &(0..count as u32).collect::<Vec<_>>());
+    alone.run(|chain| {
+        chain.pass("broadphase/sweep", "ends", (count as u32).div_ceil(256));
+        chain.pass("broadphase/sweep", "deal", 1);
+    });
+    let state: Vec<u32> = alone.take("sweep_state");
+    assert_eq!(u64::from(state[2]) | u64::from(state[3]) << 32, sweep::find_pairs(&boxes, 10).items);
+    assert_eq!(raised(&alone.take("counters")[0]), [overflow::SWEEP, u32::MAX]);
 }

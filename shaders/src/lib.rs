@@ -11,6 +11,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("batch", include_str!("../batch.wgsl")),
     ("bounds", include_str!("../bounds.wgsl")),
     ("broadphase/grid", include_str!("../broadphase/grid.wgsl")),
+    ("broadphase/sweep", include_str!("../broadphase/sweep.wgsl")),
     ("contact", include_str!("../contact.wgsl")),
     ("edit", include_str!("../edit.wgsl")),
     ("motion", include_str!("../motion.wgsl")),
