@@ -153,8 +153,9 @@ fn to_ordered(x: f32) -> u32 {
 fn prepare(alone: &mut Alone, boxes: &Boxes, step: &StepParams, control: &Control) -> (Sort, Scan) {
     let count = boxes.aabbs.len();
     let [center_min, center_max] = [boxes.low.map(to_ordered), boxes.high.map(to_ordered)];
+    let large_count = boxes.unbounded.len() as u32;
     alone.put("step", &[*step]);
-    alone.put("counters", &[Control { center_min, center_max, ..*control }]);
+    alone.put("counters", &[Control { center_min, center_max, large_count, ..*control }]);
     alone.put("aabbs", boxes.aabbs);
     alone.put("sweep_state", &[GARBAGE; 16]);
     for name in ["sweep_keys", "sweep_order", "sweep_ends", "sweep_offsets"] {
@@ -162,6 +163,8 @@ fn prepare(alone: &mut Alone, boxes: &Boxes, step: &StepParams, control: &Contro
     }
     alone.put("sweep_boxes", &vec![[GARBAGE; 8]; count]);
     alone.put("sweep_args", &[GARBAGE; 4]);
+    alone.put("large_list", &[&boxes.unbounded[..], &vec![GARBAGE; count - boxes.unbounded.len()]].concat());
+    alone.put("pair_keys", &vec![[GARBAGE; 2]; step.pair_capacity as usize]);
     let gpu = common::gpu();
     let by_place = SortOptions { capacity: count as u32, count: Count::Host(count as u32), bits: vec![32] };
     let offsets = ScanOptions { capacity: count as u32, count: Count::Host(count as u32), total: None };
@@ -186,18 +189,22 @@ fn run_sweep(alone: &mut Alone, boxes: &Boxes, step: &StepParams, control: &Cont
         chain.pass(stem, "ends", by_collider);
         scan.record(&mut chain.recorder, &offsets, None).unwrap();
         chain.pass(stem, "deal", 1);
+        chain.indirect(stem, "sweep", "sweep_args");
     });
     alone.take("counters")[0]
 }
 
 #[test]
-fn the_gpu_sorts_and_deals_as_the_cpu_does() {
-    for (name, aabbs) in hard_crowds() {
-        let boxes = Boxes::new(&aabbs);
-        let (axis, sorted, ends, items) = passes(&boxes);
-        let step = step_of(aabbs.len() as u32);
-        for permute in PERMUTATIONS {
-            let mut alone = Alone::new(permute);
+fn the_gpu_sweeps_as_the_cpu_does() {
+    let crowds = hard_crowds();
+    for permute in PERMUTATIONS {
+        let mut alone = Alone::new(permute);
+        for (name, aabbs) in &crowds {
+            let boxes = Boxes::new(aabbs);
+            let (axis, sorted, ends, items) = passes(&boxes);
+            let mut found = sweep::find_pairs(&boxes, u32::MAX).pairs;
+            found.retain(|pair| pair.iter().any(|i| !boxes.unbounded.contains(i)));
+            let step = StepParams { pair_capacity: found.len() as u32 + 3, ..step_of(aabbs.len() as u32) };
             let control = run_sweep(&mut alone, &boxes, &step, &Control::zeroed());
             let what = format!("{name}, permuted {permute}");
             let held = ends.len();
@@ -210,6 +217,11 @@ fn the_gpu_sorts_and_deals_as_the_cpu_does() {
             assert!(alone.take::<u32>("sweep_ends")[..held] == ends, "{what}: ends");
             assert!(alone.take::<u32>("sweep_offsets")[..held] == items.offsets, "{what}: offsets");
             assert_eq!(alone.take::<u32>("sweep_args")[..3], [items.count.div_ceil(256) as u32, 1, 1], "{what}");
+            assert_eq!(control.pair_count as usize, found.len(), "{what}");
+            let mut pairs: Vec<[u32; 2]> = alone.take("pair_keys");
+            assert!(pairs.split_off(found.len()).iter().all(|key| *key == [GARBAGE; 2]), "{what}");
+            pairs.sort_unstable();
+            assert!(pairs == found, "{what}: pairs");
             assert_eq!([control.stop, control.overflow, control.needed], [0; 3], "{what}");
         }
     }

@@ -228,3 +228,71 @@ fn deal(@builtin(local_invocation_index) lid: u32) {
     sweep_args[1] = y;
     sweep_args[2] = 1u;
 }
+
+@compute @workgroup_size(256)
+fn sweep(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let item = invocation(wg, num, lid);
+    let count = atomicLoad(&sweep_state[STATE_COUNT]);
+    if item >= atomicLoad(&sweep_state[STATE_ITEMS]) {
+        return;
+    }
+    if item < count {
+        let own = sweep_boxes[item];
+        with_unbounded(own);
+        let first = item + 1u;
+        look_at(own, first, min(sweep_ends[item], first + SWEEP_CHUNK), 1u);
+        return;
+    }
+    // The last place with no more extra items before it.
+    let extra = item - count;
+    var low = 0u;
+    var high = count;
+    while low < high { // 27 turns at most
+        let middle = low + (high - low) / 2u;
+        if sweep_offsets[middle] <= extra {
+            low = middle + 1u;
+        } else {
+            high = middle;
+        }
+    }
+    let place = low - 1u;
+    let end = sweep_ends[place];
+    let first = place + 1u + SWEEP_CHUNK + extra - sweep_offsets[place];
+    look_at(sweep_boxes[place], first, end, extra_items(place, end));
+}
+
+// Pairs with every `stride`-th of the places from `first` up to `end`, SWEEP_CHUNK at most.
+fn look_at(own: Aabb, first: u32, end: u32, stride: u32) {
+    for (var place = first; place < end; place += stride) {
+        let other = sweep_boxes[place];
+        if meets(own, other) {
+            keep_pair(own.size_class, other.size_class);
+        }
+    }
+}
+
+fn with_unbounded(own: Aabb) {
+    let unbounded = min(atomicLoad(&counters[CONTROL_LARGE_COUNT]), UNBOUNDED_LIMIT);
+    for (var k = 0u; k < unbounded; k++) {
+        let j = large_list[k];
+        if meets(own, aabbs[j]) {
+            keep_pair(own.size_class, j);
+        }
+    }
+}
+
+// STUB
+const UNBOUNDED_LIMIT: u32 = 8192u;
+@group(0) @binding(10) var<storage, read> large_list: array<u32>;
+@group(0) @binding(11) var<storage, read_write> pair_keys: array<u32>;
+fn keep_pair(i: u32, j: u32) {
+    let place = atomicAdd(&counters[CONTROL_PAIR_COUNT], 1u);
+    if place < step.pair_capacity {
+        pair_keys[2u * place] = min(i, j);
+        pair_keys[2u * place + 1u] = max(i, j);
+    }
+}

@@ -37,7 +37,7 @@ impl Alone {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         if self.bytes.insert(name, bytes.len()) != Some(bytes.len()) {
             // Never too small for one element of a struct.
-            let usages = BufferUsages::STORAGE | BufferUsages::UNIFORM;
+            let usages = BufferUsages::STORAGE | BufferUsages::UNIFORM | BufferUsages::INDIRECT;
             self.buffers.create(gpu(), name, 1, bytes.len().max(512) as u64, usages).unwrap();
         }
         gpu().queue.write_buffer(self.buffers.buffer(name).unwrap(), 0, bytes);
@@ -79,6 +79,12 @@ impl<'a> Chain<'a> {
     pub(crate) fn indexed(&mut self, stem: &str, entry: &str, (name, index): (&str, u32), groups: u32) {
         let bind = self.index(name, index);
         self.record(stem, entry, &[bind], groups);
+    }
+
+    /// Workgroups that the buffer `args` tells.
+    pub(crate) fn indirect(&mut self, stem: &str, entry: &str, args: &str) {
+        let pass = self.pipelines.pass(gpu(), stem, entry).unwrap();
+        self.recorder.dispatch_indirect(&pass, &[], self.buffers.buffer(args).unwrap(), 0).unwrap();
     }
 
     fn index<'b>(&self, name: &'b str, index: u32) -> Bind<'b>
