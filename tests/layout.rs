@@ -98,7 +98,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         EditRecord { op, target, kind, generation, data }
         EditRange { first, count }
         TreeNode { min, child, max, escape }
-        TreeInfo { count, members, words, capacity }
+        TreeInfo { slots, members, words, capacity }
         StepParams {
             dt, h, inverse_h, substeps, gravity, step, bias_rate, mass_scale, impulse_scale, push_speed,
             speculative_distance, restitution_threshold, body_count, collider_count, pair_capacity, cell_table_bits,
@@ -132,7 +132,7 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
             SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, COLLIDER,
             COLLIDER_REMOVE
         }
-        tree_members as "MEMBERS_" { MOVING, FIXED, LARGE }
+        tree_members as "MEMBERS_" { MOVING, FIXED, LARGE, ALL }
         ;
         BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT, NO_NODE
     }

@@ -9,21 +9,27 @@ mod common;
 mod crowds;
 #[path = "common/random.rs"]
 mod random;
+#[path = "common/worlds.rs"]
+mod worlds;
 
 use alone::Alone;
 use bytemuck::Zeroable;
-use crowds::{boxed, crowds};
+use crowds::{boxed, counted, crowds, to_ordered};
 use random::{Random, step_of};
 use tumble_core::glam::Vec3;
 use tumble_core::layout::*;
 use tumble_core::limits::{SWEEP_CHUNK, SWEEP_ITEM_LIMIT};
+use tumble_core::{Broadphase, Capacities, ColliderBuilder, Error, Params, RigidBodyBuilder, Scene, scenes};
 use tumble_cpu::bounds::{FAR, size_class};
 use tumble_cpu::broadphase::sweep::{self, Items, Sorted};
 use tumble_cpu::broadphase::{Boxes, TooMany, brute_force, too_many};
 use tumble_gpu::primitives::{Count, Scan, ScanOptions, Sort, SortOptions};
+use worlds::{SIDES, hash, report, steps};
 
 const PERMUTATIONS: [u32; 3] = [0, 1, 2];
 const GARBAGE: u32 = 0xdead_beef;
+/// Word of `Control`.
+const PAIR_COUNT: u32 = 8;
 
 /// The crowds of all broad phases, and such as a sweep finds hard.
 fn hard_crowds() -> Vec<(String, Vec<Aabb>)> {
@@ -71,6 +77,11 @@ fn hard_crowds() -> Vec<(String, Vec<Aabb>)> {
         }
     }
     all.push(("half-spaces and holes".to_owned(), endless));
+    let mut few: Vec<_> = (0..700).map(|i| boxed(random.vector(2.0), Vec3::splat(0.5), i)).collect();
+    few[3..]
+        .iter_mut()
+        .for_each(|aabb| (aabb.min, aabb.max, aabb.class) = ([-FAR; 3], [0.5, FAR, FAR], size_class(FAR)));
+    all.push(("half-spaces above all".to_owned(), few));
     all
 }
 
@@ -145,17 +156,11 @@ fn more_work_than_may_be_is_refused() {
     assert_eq!(too_many(&boxes, &found), Some(TooMany::Items(found.items)));
 }
 
-fn to_ordered(x: f32) -> u32 {
-    if x.to_bits() >> 31 == 0 { x.to_bits() | 1 << 31 } else { !x.to_bits() }
-}
-
 /// Fills in what the passes bind, and makes the sort and the scan between them.
 fn prepare(alone: &mut Alone, boxes: &Boxes, step: &StepParams, control: &Control) -> (Sort, Scan) {
     let count = boxes.aabbs.len();
-    let [center_min, center_max] = [boxes.low.map(to_ordered), boxes.high.map(to_ordered)];
-    let large_count = boxes.unbounded.len() as u32;
     alone.put("step", &[*step]);
-    alone.put("counters", &[Control { center_min, center_max, large_count, ..*control }]);
+    alone.put("counters", &[counted(boxes, control)]);
     alone.put("aabbs", boxes.aabbs);
     alone.put("sweep_state", &[GARBAGE; 16]);
     for name in ["sweep_keys", "sweep_order", "sweep_ends", "sweep_offsets"] {
@@ -165,20 +170,22 @@ fn prepare(alone: &mut Alone, boxes: &Boxes, step: &StepParams, control: &Contro
     alone.put("sweep_args", &[GARBAGE; 4]);
     alone.put("large_list", &[&boxes.unbounded[..], &vec![GARBAGE; count - boxes.unbounded.len()]].concat());
     alone.put("pair_keys", &vec![[GARBAGE; 2]; step.pair_capacity as usize]);
+    alone.put("pair_values", &vec![GARBAGE; step.pair_capacity as usize]);
     let gpu = common::gpu();
     let by_place = SortOptions { capacity: count as u32, count: Count::Host(count as u32), bits: vec![32] };
     let offsets = ScanOptions { capacity: count as u32, count: Count::Host(count as u32), total: None };
-    (
-        Sort::new(gpu, &mut alone.pipelines, by_place).unwrap(),
-        Scan::new(gpu, &mut alone.pipelines, offsets).unwrap(),
-    )
+    (Sort::new(gpu, &mut alone.pipelines, by_place).unwrap(), Scan::new(gpu, &mut alone.pipelines, offsets).unwrap())
 }
 
-/// All passes of the sweep, one after the other.
+/// All passes of the sweep, one after the other, then the gate and the sort behind every broad phase.
 fn run_sweep(alone: &mut Alone, boxes: &Boxes, step: &StepParams, control: &Control) -> Control {
     let (sort, scan) = prepare(alone, boxes, step, control);
+    let bits = vec![32 - step.collider_count.leading_zeros(); 2];
+    let by_pair = SortOptions { capacity: step.pair_capacity, count: Count::Word(PAIR_COUNT), bits };
+    let sort_pairs = Sort::new(common::gpu(), &mut alone.pipelines, by_pair).unwrap();
     let buffer = |name: &str| alone.buffers.buffer(name).unwrap().clone();
     let [keys, order, offsets] = ["sweep_keys", "sweep_order", "sweep_offsets"].map(buffer);
+    let [pair_keys, pair_values, counters] = ["pair_keys", "pair_values", "counters"].map(buffer);
     let by_collider = (boxes.aabbs.len() as u32).div_ceil(256) + 1;
     alone.run(|chain| {
         let stem = "broadphase/sweep";
@@ -190,6 +197,8 @@ fn run_sweep(alone: &mut Alone, boxes: &Boxes, step: &StepParams, control: &Cont
         scan.record(&mut chain.recorder, &offsets, None).unwrap();
         chain.pass(stem, "deal", 1);
         chain.indirect(stem, "sweep", "sweep_args");
+        chain.pass("broadphase/pairs", "gate", 1);
+        sort_pairs.record(&mut chain.recorder, &pair_keys, &pair_values, Some(&counters)).unwrap();
     });
     alone.take("counters")[0]
 }
@@ -202,9 +211,8 @@ fn the_gpu_sweeps_as_the_cpu_does() {
         for (name, aabbs) in &crowds {
             let boxes = Boxes::new(aabbs);
             let (axis, sorted, ends, items) = passes(&boxes);
-            let mut found = sweep::find_pairs(&boxes, u32::MAX).pairs;
-            found.retain(|pair| pair.iter().any(|i| !boxes.unbounded.contains(i)));
-            let step = StepParams { pair_capacity: found.len() as u32 + 3, ..step_of(aabbs.len() as u32) };
+            let found = sweep::find_pairs(&boxes, u32::MAX);
+            let step = StepParams { pair_capacity: found.count as u32 + 3, ..step_of(aabbs.len() as u32) };
             let control = run_sweep(&mut alone, &boxes, &step, &Control::zeroed());
             let what = format!("{name}, permuted {permute}");
             let held = ends.len();
@@ -216,12 +224,12 @@ fn the_gpu_sweeps_as_the_cpu_does() {
             assert!(alone.take::<Aabb>("sweep_boxes")[..held] == sorted.boxes, "{what}: boxes");
             assert!(alone.take::<u32>("sweep_ends")[..held] == ends, "{what}: ends");
             assert!(alone.take::<u32>("sweep_offsets")[..held] == items.offsets, "{what}: offsets");
-            assert_eq!(alone.take::<u32>("sweep_args")[..3], [items.count.div_ceil(256) as u32, 1, 1], "{what}");
-            assert_eq!(control.pair_count as usize, found.len(), "{what}");
-            let mut pairs: Vec<[u32; 2]> = alone.take("pair_keys");
-            assert!(pairs.split_off(found.len()).iter().all(|key| *key == [GARBAGE; 2]), "{what}");
-            pairs.sort_unstable();
-            assert!(pairs == found, "{what}: pairs");
+            let threads = items.count.max(boxes.unbounded.len() as u64);
+            assert_eq!(alone.take::<u32>("sweep_args")[..3], [threads.div_ceil(256) as u32, 1, 1], "{what}");
+            assert_eq!([control.pair_count, control.turns], [found.count as u32, found.turns], "{what}");
+            let pairs: Vec<[u32; 2]> = alone.take("pair_keys");
+            assert!(pairs[..found.pairs.len()] == found.pairs, "{what}: pairs");
+            assert!(pairs[found.pairs.len()..].iter().all(|key| *key == [GARBAGE; 2]), "{what}");
             assert_eq!([control.stop, control.overflow, control.needed], [0; 3], "{what}");
         }
     }
@@ -252,19 +260,19 @@ fn sums_do_not_wrap() {
 
 #[test]
 fn the_gpu_refuses_as_much_work_as_the_cpu_does() {
-    let raised = |c: &Control| [c.overflow, c.needed];
+    let raised = |c: &Control| [c.stop, c.overflow, c.needed, c.pair_count];
     let crowd = vec![boxed(Vec3::ZERO, Vec3::splat(0.5), 0); 372_000];
     let boxes = Boxes::new(&crowd);
     let items = sweep::find_pairs(&boxes, 10).items as u32;
     let step = StepParams { pair_capacity: 10, ..step_of(crowd.len() as u32) };
     let mut alone = Alone::new(0);
     let control = run_sweep(&mut alone, &boxes, &step, &Control::zeroed());
-    assert_eq!(raised(&control), [overflow::SWEEP, items]);
+    assert_eq!(raised(&control), [1, overflow::SWEEP, items, 0]);
     assert_eq!(alone.take::<u32>("sweep_args")[..3], [0, 1, 1]);
     // A step after one that stopped changes nothing of what that one said.
     let before = Control { stop: 1, overflow: overflow::LAST_BATCH, needed: 77, ..Control::zeroed() };
     let control = run_sweep(&mut alone, &boxes, &step, &before);
-    assert_eq!(raised(&control), [overflow::LAST_BATCH, 77]);
+    assert_eq!(raised(&control), [1, overflow::LAST_BATCH, 77, 0]);
     assert_eq!(alone.take::<u32>("sweep_args")[..3], [0, 1, 1]);
     // More than a word counts: half of the square of their number, by 256.
     let count = 1_500_000;
@@ -283,5 +291,68 @@ fn the_gpu_refuses_as_much_work_as_the_cpu_does() {
     });
     let state: Vec<u32> = alone.take("sweep_state");
     assert_eq!(u64::from(state[2]) | u64::from(state[3]) << 32, sweep::find_pairs(&boxes, 10).items);
-    assert_eq!(raised(&alone.take("counters")[0]), [overflow::SWEEP, u32::MAX]);
+    assert_eq!(raised(&alone.take("counters")[0]), [0, overflow::SWEEP, u32::MAX, 0]);
+}
+
+#[test]
+fn too_many_pairs_stop_the_step() {
+    let raised = |c: &Control| [c.stop, c.overflow, c.needed, c.pair_count];
+    let crowd = crowds().swap_remove(7).1;
+    let boxes = Boxes::new(&crowd);
+    let pairs = sweep::find_pairs(&boxes, u32::MAX).count as u32;
+    for permute in PERMUTATIONS {
+        let mut alone = Alone::new(permute);
+        let mut step = StepParams { pair_capacity: pairs - 1, ..step_of(crowd.len() as u32) };
+        let control = run_sweep(&mut alone, &boxes, &step, &Control::zeroed());
+        assert_eq!(raised(&control), [1, overflow::PAIRS, pairs, 0]);
+        step.pair_capacity = pairs;
+        let control = run_sweep(&mut alone, &boxes, &step, &Control::zeroed());
+        assert_eq!(raised(&control), [0, 0, 0, pairs]);
+        let keys: Vec<[u32; 2]> = alone.take("pair_keys");
+        assert!(keys == sweep::find_pairs(&boxes, u32::MAX).pairs);
+    }
+}
+
+/// Worlds that grow their buffers and get bodies on the way. Oracle: brute force, bit for bit.
+#[test]
+fn worlds_are_the_same_as_with_brute_force() {
+    for side in SIDES {
+        let run = |broadphase| {
+            let capacities = Capacities { pairs: Some(10), ..Capacities::default() };
+            let params = Params { broadphase, capacities, ..Params::default() };
+            let mut world = side.world(&scenes::mixed(200), &params);
+            let mut hashes = Vec::new();
+            for _ in 0..5 {
+                steps(&mut world, 6);
+                for k in 0..40 {
+                    let body = RigidBodyBuilder::dynamic().translation(Vec3::new(0.3 * k as f32, 6.0, 0.0));
+                    world.edit().insert(body, ColliderBuilder::ball(0.2)).unwrap();
+                }
+                hashes.push(hash(&mut world));
+            }
+            let report = report(&mut world);
+            assert_eq!((report.broadphase, report.lost), (broadphase, 0), "{side:?}");
+            assert!(report.growths_of("pairs") > 0 && report.growths_of("colliders") > 0, "{side:?}: {report}");
+            (hashes, report.pairs, report.broadphase_bytes)
+        };
+        let [by_sweep, expected] = [Broadphase::SweepAndPrune, Broadphase::BruteForce].map(run);
+        assert_eq!((&by_sweep.0, by_sweep.1), (&expected.0, expected.1), "{side:?}");
+        assert!(by_sweep.2 > 48 * 400, "{side:?}: {} bytes", by_sweep.2);
+    }
+}
+
+#[test]
+fn worlds_refuse_more_work_than_may_be() {
+    let mut scene = Scene::new();
+    for _ in 0..372_000 {
+        scene.insert(RigidBodyBuilder::fixed(), ColliderBuilder::ball(0.1));
+    }
+    let items = sweep::find_pairs(&Boxes::new(&vec![boxed(Vec3::ZERO, Vec3::ONE, 0); 372_000]), 10).items;
+    let capacities = Capacities { pairs: Some(1000), ..Capacities::default() };
+    let params = Params { broadphase: Broadphase::SweepAndPrune, capacities, ..Params::default() };
+    for side in SIDES {
+        let mut world = side.world(&scene, &params);
+        let error = world.step().and_then(|()| world.sync().map(drop)).unwrap_err();
+        assert_eq!(error, Error::Capacity { buffer: "sweep", needed: items, capacity: SWEEP_ITEM_LIMIT.into() });
+    }
 }

@@ -9,17 +9,16 @@
 //   ends    one thread a place: its box to sweep_boxes, the first place that begins behind it to sweep_ends, how many
 //           extra items of work it has to sweep_offsets, all items to sweep_state.
 //   (primitives/scan of sweep_offsets)
-//   deal    one invocation: raises an overflow when there are too many items; their dispatch to sweep_args.
-//   sweep   one thread an item: pairs to pair_keys. The first items are the places', with their first candidates; the
-//           rest of the candidates is dealt out to the extra ones, one each in turn, so that neighbours read neighbours.
+//   deal    one invocation: notes an overflow when there are too many items; their dispatch to sweep_args.
+//   sweep   one thread an item: pairs to pair_keys. The first items are the places', with their first candidates and
+//           large_list; the rest of the candidates is dealt out to the extra ones, one each in turn, so that neighbours
+//           read neighbours. One thread a collider of large_list: the pairs with those behind it.
 //
 // After Liu, Harada, Lee and Kim, "Real-time collision culling of a million bodies on graphics processing units"
 // (SIGGRAPH Asia 2010): a collider is tested against those that begin before it ends, in items of at most SWEEP_CHUNK
 // candidates, so that one long box keeps no thread busy for long.
 
-//#import shared/aabb.wgsl
-//#import shared/control.wgsl
-//#import shared/step.wgsl
+//#import shared/pairs.wgsl
 //#import shared/thread.wgsl
 //#import shared/workgroup.wgsl
 
@@ -36,16 +35,13 @@ const STATE_SUM: u32 = 4u; // three
 const STATE_SQUARES: u32 = 8u; // three low words, then after one more three high ones
 const STATE_WORDS: u32 = 16u;
 
-@group(0) @binding(0) var<uniform> step: StepParams;
-@group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
-@group(0) @binding(2) var<storage, read> aabbs: array<Aabb>;
-@group(0) @binding(3) var<storage, read_write> sweep_state: array<atomic<u32>>;
-@group(0) @binding(4) var<storage, read_write> sweep_keys: array<u32>;
-@group(0) @binding(5) var<storage, read_write> sweep_order: array<u32>;
-@group(0) @binding(6) var<storage, read_write> sweep_boxes: array<Aabb>;
-@group(0) @binding(7) var<storage, read_write> sweep_ends: array<u32>;
-@group(0) @binding(8) var<storage, read_write> sweep_offsets: array<u32>;
-@group(0) @binding(9) var<storage, read_write> sweep_args: array<u32>;
+@group(0) @binding(5) var<storage, read_write> sweep_state: array<atomic<u32>>;
+@group(0) @binding(6) var<storage, read_write> sweep_keys: array<u32>;
+@group(0) @binding(7) var<storage, read_write> sweep_order: array<u32>;
+@group(0) @binding(8) var<storage, read_write> sweep_boxes: array<Aabb>;
+@group(0) @binding(9) var<storage, read_write> sweep_ends: array<u32>;
+@group(0) @binding(10) var<storage, read_write> sweep_offsets: array<u32>;
+@group(0) @binding(11) var<storage, read_write> sweep_args: array<u32>;
 
 @compute @workgroup_size(256)
 fn begin(@builtin(local_invocation_index) lid: u32) {
@@ -222,7 +218,9 @@ fn deal(@builtin(local_invocation_index) lid: u32) {
         atomicMax(&counters[CONTROL_NEEDED], needed);
         items = 0u;
     }
-    let groups = (items + WORKGROUP - 1u) / WORKGROUP;
+    // Some of them have a collider of large_list as well.
+    let threads = max(items, large_count());
+    let groups = (threads + WORKGROUP - 1u) / WORKGROUP;
     let y = max((groups + MOST_PER_DIMENSION - 1u) / MOST_PER_DIMENSION, 1u);
     sweep_args[0] = (groups + y - 1u) / y;
     sweep_args[1] = y;
@@ -236,19 +234,47 @@ fn sweep(
     @builtin(local_invocation_index) lid: u32,
 ) {
     let item = invocation(wg, num, lid);
+    var turns = 0u;
+    within_list(item);
+    if item < atomicLoad(&sweep_state[STATE_ITEMS]) {
+        turns = look_at(item);
+    }
+    end_search(local_index(lid), turns);
+}
+
+// Pairs of one item of work; returns how many candidates it had, SWEEP_CHUNK at most.
+fn look_at(item: u32) -> u32 {
     let count = atomicLoad(&sweep_state[STATE_COUNT]);
-    if item >= atomicLoad(&sweep_state[STATE_ITEMS]) {
-        return;
-    }
+    var place = item;
+    var first = place + 1u;
+    var stride = 1u;
+    var end = 0u;
     if item < count {
-        let own = sweep_boxes[item];
-        with_unbounded(own);
-        let first = item + 1u;
-        look_at(own, first, min(sweep_ends[item], first + SWEEP_CHUNK), 1u);
-        return;
+        end = min(sweep_ends[place], first + SWEEP_CHUNK);
+    } else {
+        let extra = item - count;
+        place = place_of(extra, count);
+        end = sweep_ends[place];
+        first = place + 1u + SWEEP_CHUNK + extra - sweep_offsets[place];
+        stride = extra_items(place, end);
     }
-    // The last place with no more extra items before it.
-    let extra = item - count;
+    let own = sweep_boxes[place];
+    if item < count {
+        with_list(own.size_class, own);
+    }
+    var turns = 0u;
+    for (var k = first; k < end; k += stride) {
+        let other = sweep_boxes[k];
+        if meets(own, other) {
+            keep_pair(own.size_class, other.size_class);
+        }
+        turns += 1u;
+    }
+    return turns;
+}
+
+// The last place that has no more than so many extra items before it.
+fn place_of(extra: u32, count: u32) -> u32 {
     var low = 0u;
     var high = count;
     while low < high { // 27 turns at most
@@ -259,40 +285,5 @@ fn sweep(
             high = middle;
         }
     }
-    let place = low - 1u;
-    let end = sweep_ends[place];
-    let first = place + 1u + SWEEP_CHUNK + extra - sweep_offsets[place];
-    look_at(sweep_boxes[place], first, end, extra_items(place, end));
-}
-
-// Pairs with every `stride`-th of the places from `first` up to `end`, SWEEP_CHUNK at most.
-fn look_at(own: Aabb, first: u32, end: u32, stride: u32) {
-    for (var place = first; place < end; place += stride) {
-        let other = sweep_boxes[place];
-        if meets(own, other) {
-            keep_pair(own.size_class, other.size_class);
-        }
-    }
-}
-
-fn with_unbounded(own: Aabb) {
-    let unbounded = min(atomicLoad(&counters[CONTROL_LARGE_COUNT]), UNBOUNDED_LIMIT);
-    for (var k = 0u; k < unbounded; k++) {
-        let j = large_list[k];
-        if meets(own, aabbs[j]) {
-            keep_pair(own.size_class, j);
-        }
-    }
-}
-
-// STUB
-const UNBOUNDED_LIMIT: u32 = 8192u;
-@group(0) @binding(10) var<storage, read> large_list: array<u32>;
-@group(0) @binding(11) var<storage, read_write> pair_keys: array<u32>;
-fn keep_pair(i: u32, j: u32) {
-    let place = atomicAdd(&counters[CONTROL_PAIR_COUNT], 1u);
-    if place < step.pair_capacity {
-        pair_keys[2u * place] = min(i, j);
-        pair_keys[2u * place + 1u] = max(i, j);
-    }
+    return low - 1u;
 }

@@ -8,6 +8,7 @@ const NO_NODE: u32 = 0xffffffffu;
 const MEMBERS_MOVING: u32 = 0u;
 const MEMBERS_FIXED: u32 = 1u;
 const MEMBERS_LARGE: u32 = 2u;
+const MEMBERS_ALL: u32 = 3u;
 
 struct TreeNode {
     min: vec3<f32>,
@@ -17,7 +18,7 @@ struct TreeNode {
 }
 
 struct TreeInfo {
-    count: u32,
+    slots: u32,
     members: u32,
     words: u32,
     capacity: u32,

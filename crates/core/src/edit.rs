@@ -1,7 +1,9 @@
 //! Changes between steps. Each becomes a record in an ordered log; a gated pass applies the records at the start of
 //! their step, on whichever side the world runs, so that a step run again neither loses nor doubles one.
 
-use crate::builder::{ColliderBuilder, RigidBodyBuilder, RigidBodyType, check_finite, check_position, check_rotation, check_speed};
+use crate::builder::{
+    ColliderBuilder, RigidBodyBuilder, RigidBodyType, check_finite, check_position, check_rotation, check_speed,
+};
 use crate::choice::Spread;
 use crate::error::{Result, check};
 use crate::handle::{BodyHandle, ColliderHandle, Inserted};
