@@ -186,6 +186,8 @@ fn run_sweep(alone: &mut Alone, boxes: &Boxes, step: &StepParams, control: &Cont
     let buffer = |name: &str| alone.buffers.buffer(name).unwrap().clone();
     let [keys, order, offsets] = ["sweep_keys", "sweep_order", "sweep_offsets"].map(buffer);
     let [pair_keys, pair_values, counters] = ["pair_keys", "pair_values", "counters"].map(buffer);
+    let (sweep, args) =
+        (alone.pipelines.pass(common::gpu(), "broadphase/sweep", "sweep").unwrap(), buffer("sweep_args"));
     let by_collider = (boxes.aabbs.len() as u32).div_ceil(256) + 1;
     alone.run(|chain| {
         let stem = "broadphase/sweep";
@@ -196,7 +198,7 @@ fn run_sweep(alone: &mut Alone, boxes: &Boxes, step: &StepParams, control: &Cont
         chain.pass(stem, "ends", by_collider);
         scan.record(&mut chain.recorder, &offsets, None).unwrap();
         chain.pass(stem, "deal", 1);
-        chain.indirect(stem, "sweep", "sweep_args");
+        chain.recorder.dispatch_indirect(&sweep, &[], &args, 0).unwrap();
         chain.pass("broadphase/pairs", "gate", 1);
         sort_pairs.record(&mut chain.recorder, &pair_keys, &pair_values, Some(&counters)).unwrap();
     });

@@ -81,12 +81,6 @@ impl<'a> Chain<'a> {
         self.record(stem, entry, &[bind], groups);
     }
 
-    /// Workgroups that the buffer `args` tells.
-    pub(crate) fn indirect(&mut self, stem: &str, entry: &str, args: &str) {
-        let pass = self.pipelines.pass(gpu(), stem, entry).unwrap();
-        self.recorder.dispatch_indirect(&pass, &[], self.buffers.buffer(args).unwrap(), 0).unwrap();
-    }
-
     fn index<'b>(&self, name: &'b str, index: u32) -> Bind<'b>
     where
         'a: 'b,

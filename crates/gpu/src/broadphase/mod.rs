@@ -53,18 +53,18 @@ pub(crate) struct Broadphase {
 
 enum Kind {
     BruteForce(BruteForce),
-    Grid(Grid),
-    Lbvh(Lbvh),
-    Sweep(Sweep),
+    Grid(Box<Grid>),
+    Lbvh(Box<Lbvh>),
+    Sweep(Box<Sweep>),
 }
 
 impl Broadphase {
     pub(crate) fn new(gpu: &Gpu, pipelines: &mut Pipelines, sizes: &Sizes, choice: &Choice) -> Result<Self> {
         let kind = match choice.which {
             Which::BruteForce => Kind::BruteForce(BruteForce::new(gpu, pipelines)?),
-            Which::Lbvh => Kind::Lbvh(Lbvh::new(gpu, pipelines, sizes, choice)?),
-            Which::SweepAndPrune => Kind::Sweep(Sweep::new(gpu, pipelines, sizes)?),
-            _ => Kind::Grid(Grid::new(gpu, pipelines, sizes, choice)?),
+            Which::Lbvh => Kind::Lbvh(Box::new(Lbvh::new(gpu, pipelines, sizes, choice)?)),
+            Which::SweepAndPrune => Kind::Sweep(Box::new(Sweep::new(gpu, pipelines, sizes)?)),
+            _ => Kind::Grid(Box::new(Grid::new(gpu, pipelines, sizes, choice)?)),
         };
         let bits = 32 - sizes.colliders.saturating_sub(1).leading_zeros();
         let by_pair = SortOptions { capacity: sizes.pairs, count: Count::Word(word::PAIR_COUNT), bits: vec![bits; 2] };
