@@ -33,8 +33,9 @@ pub use tumble_gpu as gpu;
 
 pub use tumble_core as core;
 pub use tumble_core::{
-    BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Editor, Error, Inserted, Params,
-    Pose, Poses, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, StepReport, Velocities, Velocity,
+    BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Editor, Error, Inserted,
+    MortonBits, Params, Pose, Poses, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, StepReport, Traversal,
+    Velocities, Velocity,
 };
 pub use world::{Backend, World};
 
