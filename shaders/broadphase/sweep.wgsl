@@ -6,8 +6,9 @@
 //   keys    one thread a collider: the axis of largest variance to sweep_state; where the box begins along it to
 //           sweep_keys, the collider to sweep_order.
 //   (primitives/sort of sweep_keys and sweep_order)
-//   ends    one thread a place: its box to sweep_boxes, the first place that begins behind it to sweep_ends, how many
-//           extra items of work it has to sweep_offsets, all items to sweep_state.
+//   ends    one thread a place: the collider and the first place that begins behind it to sweep_places, the box's sides
+//           across the axis to sweep_sides, how many extra items of work it has to sweep_offsets, all items to
+//           sweep_state. Reads aabbs.
 //   (primitives/scan of sweep_offsets)
 //   deal    one invocation: notes an overflow when there are too many items; their dispatch to sweep_args.
 //   sweep   one thread an item: pairs to pair_keys. The first items are the places', with their first candidates and
@@ -38,8 +39,8 @@ const STATE_WORDS: u32 = 16u;
 @group(0) @binding(5) var<storage, read_write> sweep_state: array<atomic<u32>>;
 @group(0) @binding(6) var<storage, read_write> sweep_keys: array<u32>;
 @group(0) @binding(7) var<storage, read_write> sweep_order: array<u32>;
-@group(0) @binding(8) var<storage, read_write> sweep_boxes: array<Aabb>;
-@group(0) @binding(9) var<storage, read_write> sweep_ends: array<u32>;
+@group(0) @binding(8) var<storage, read_write> sweep_places: array<vec2<u32>>; // collider, end
+@group(0) @binding(9) var<storage, read_write> sweep_sides: array<vec4<f32>>; // lower, upper; lower, upper
 @group(0) @binding(10) var<storage, read_write> sweep_offsets: array<u32>;
 @group(0) @binding(11) var<storage, read_write> sweep_args: array<u32>;
 
@@ -172,10 +173,12 @@ fn ends(
     let count = atomicLoad(&sweep_state[STATE_COUNT]);
     var items = 0u;
     if place < count {
-        var aabb = aabbs[sweep_order[place]];
-        aabb.size_class = sweep_order[place];
-        sweep_boxes[place] = aabb;
-        let last = key_of(aabb.max[atomicLoad(&sweep_state[STATE_AXIS])]);
+        let axis = atomicLoad(&sweep_state[STATE_AXIS]);
+        let u = (axis + 1u) % 3u;
+        let v = (axis + 2u) % 3u;
+        let aabb = aabbs[sweep_order[place]];
+        sweep_sides[place] = vec4<f32>(aabb.min[u], aabb.max[u], aabb.min[v], aabb.max[v]);
+        let last = key_of(aabb.max[axis]);
         var low = place;
         var high = count;
         while low < high { // 27 turns at most
@@ -186,7 +189,7 @@ fn ends(
                 high = middle;
             }
         }
-        sweep_ends[place] = low;
+        sweep_places[place] = vec2<u32>(sweep_order[place], low);
         items = 1u + extra_items(place, low);
     }
     if place < step.collider_count {
@@ -250,23 +253,28 @@ fn look_at(item: u32) -> u32 {
     var stride = 1u;
     var end = 0u;
     if item < count {
-        end = min(sweep_ends[place], first + SWEEP_CHUNK);
+        end = min(sweep_places[place].y, first + SWEEP_CHUNK);
     } else {
         let extra = item - count;
         place = place_of(extra, count);
-        end = sweep_ends[place];
+        end = sweep_places[place].y;
         first = place + 1u + SWEEP_CHUNK + extra - sweep_offsets[place];
         stride = extra_items(place, end);
     }
-    let own = sweep_boxes[place];
+    let i = sweep_places[place].x;
+    let own = aabbs[i];
     if item < count {
-        with_list(own.size_class, own);
+        with_list(i, own);
     }
+    let sides = sweep_sides[place];
     var turns = 0u;
     for (var k = first; k < end; k += stride) {
-        let other = sweep_boxes[k];
-        if meets(own, other) {
-            keep_pair(own.size_class, other.size_class);
+        let others = sweep_sides[k];
+        if !(any(others.xz > sides.yw) || any(sides.xz > others.yw)) {
+            let j = sweep_places[k].x;
+            if meets(own, aabbs[j]) {
+                keep_pair(i, j);
+            }
         }
         turns += 1u;
     }

@@ -6,7 +6,7 @@ use crate::store::Sizes;
 use crate::{Bind, Gpu, Pass, Pipelines, Recorder};
 use std::sync::Arc;
 use tumble_core::Result;
-use tumble_core::layout::{Aabb, StepParams};
+use tumble_core::layout::StepParams;
 use wgpu::BufferUsages;
 
 /// Words of `sweep_state`.
@@ -24,8 +24,8 @@ pub(crate) struct Sweep {
     state: wgpu::Buffer,
     sort_keys: wgpu::Buffer,
     order: wgpu::Buffer,
-    boxes: wgpu::Buffer,
-    ends_of: wgpu::Buffer,
+    places: wgpu::Buffer,
+    sides: wgpu::Buffer,
     offsets: wgpu::Buffer,
     args: wgpu::Buffer,
 }
@@ -50,8 +50,8 @@ impl Sweep {
             state: gpu.create_buffer("sweep state", 4 * STATE_WORDS, storage)?,
             sort_keys: each("sweep keys", 4)?,
             order: each("sweep order", 4)?,
-            boxes: each("sweep boxes", size_of::<Aabb>())?,
-            ends_of: each("sweep ends", 4)?,
+            places: each("sweep places", 8)?,
+            sides: each("sweep sides", 16)?,
             offsets: each("sweep offsets", 4)?,
             args: gpu.create_buffer("sweep arguments", 16, storage | BufferUsages::INDIRECT)?,
         })
@@ -59,7 +59,7 @@ impl Sweep {
 
     /// Bytes of all arrays, and of the sort's scratch.
     pub(crate) fn bytes(&self) -> u64 {
-        let own = [&self.sort_keys, &self.order, &self.boxes, &self.ends_of, &self.offsets];
+        let own = [&self.sort_keys, &self.order, &self.places, &self.sides, &self.offsets];
         own.iter().map(|buffer| buffer.size()).sum::<u64>() + self.sort.bytes()
     }
 
@@ -74,8 +74,8 @@ impl Sweep {
             Bind::new("sweep_state", &self.state),
             Bind::new("sweep_keys", &self.sort_keys),
             Bind::new("sweep_order", &self.order),
-            Bind::new("sweep_boxes", &self.boxes),
-            Bind::new("sweep_ends", &self.ends_of),
+            Bind::new("sweep_places", &self.places),
+            Bind::new("sweep_sides", &self.sides),
             Bind::new("sweep_offsets", &self.offsets),
             Bind::new("sweep_args", &self.args),
         ];
