@@ -26,6 +26,7 @@
 const SWEEP_CHUNK: u32 = 256u;
 const SWEEP_ITEM_LIMIT: u32 = 268435456u;
 const MOST_PER_DIMENSION: u32 = 65535u;
+const BLOCK: u32 = 32u; // candidates that are compared before any is tried
 const NOWHERE: u32 = 0xffffffffu; // key of a collider that takes no part
 
 // Words of sweep_state.
@@ -268,15 +269,22 @@ fn look_at(item: u32) -> u32 {
     }
     let sides = sweep_sides[place];
     var turns = 0u;
-    for (var k = first; k < end; k += stride) {
-        let others = sweep_sides[k];
-        if !(any(others.xz > sides.yw) || any(sides.xz > others.yw)) {
-            let j = sweep_places[k].x;
+    for (var k = first; k < end; k += BLOCK * stride) {
+        // The other two axes reject most, without a branch; what is left is tried afterwards.
+        var near = 0u;
+        for (var bit = 0u; bit < BLOCK && k + bit * stride < end; bit++) {
+            let others = sweep_sides[k + bit * stride];
+            let apart = any(others.xz > sides.yw) || any(sides.xz > others.yw);
+            near |= select(1u, 0u, apart) << bit;
+            turns += 1u;
+        }
+        while near != 0u { // BLOCK turns at most
+            let j = sweep_places[k + firstTrailingBit(near) * stride].x;
+            near &= near - 1u;
             if meets(own, aabbs[j]) {
                 keep_pair(i, j);
             }
         }
-        turns += 1u;
     }
     return turns;
 }
