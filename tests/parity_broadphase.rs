@@ -77,13 +77,13 @@ fn check_pairs(alone: &Alone, control: &Control, expected: &[[u32; 2]], what: &s
 
 #[test]
 fn brute_force_finds_the_same() {
+    let mut alones = PERMUTATIONS.map(Alone::new);
     for (name, aabbs) in crowds() {
         let boxes = Boxes::new(&aabbs);
         let expected = brute_force::find_pairs(&boxes, u32::MAX);
         let mut step = step_of(aabbs.len() as u32);
         step.pair_capacity = expected.pairs.len() as u32 + 3;
-        for permute in PERMUTATIONS {
-            let mut alone = Alone::new(permute);
+        for (permute, mut alone) in alones.iter_mut().enumerate() {
             prepare(&mut alone, &boxes, &step, &Control::zeroed());
             let tiles = aabbs.len() * aabbs.len().div_ceil(256);
             alone.run(|chain| chain.pass("broadphase/brute_force", "pairs", groups(tiles)));
@@ -153,6 +153,7 @@ fn check_grid(alone: &Alone, boxes: &Boxes, expected: &Grid, step: &StepParams, 
 
 #[test]
 fn grids_and_their_pairs_are_the_same() {
+    let mut alones = PERMUTATIONS.map(Alone::new);
     let (mut sliced, mut listed) = (0, 0);
     for (name, aabbs) in crowds() {
         let boxes = Boxes::new(&aabbs);
@@ -167,9 +168,8 @@ fn grids_and_their_pairs_are_the_same() {
             assert!(found.pairs == expected.pairs, "{name}");
             sliced += usize::from(grid.slices.is_some());
             listed += cells.large.len();
-            for permute in PERMUTATIONS {
+            for (permute, mut alone) in alones.iter_mut().enumerate() {
                 let what = format!("{name}, permuted {permute}, room for {slices} slices");
-                let mut alone = Alone::new(permute);
                 prepare(&mut alone, &boxes, &step, &Control::zeroed());
                 run_grid(&mut alone, &boxes, &step, slices, false);
                 check_grid(&alone, &boxes, &grid, &step, &what);
@@ -258,6 +258,7 @@ fn check_tree(alone: &Alone, expected: &lbvh::Tree, words: usize, what: &str) {
 
 #[test]
 fn trees_and_their_pairs_are_the_same() {
+    let mut alones = PERMUTATIONS.map(|permute| [Alone::new(permute), Alone::new(permute)]);
     for (name, aabbs) in crowds() {
         let boxes = Boxes::new(&aabbs);
         let mut step = step_of(aabbs.len() as u32);
@@ -269,33 +270,32 @@ fn trees_and_their_pairs_are_the_same() {
         for (bits, words) in [(MortonBits::Bits30, 1), (MortonBits::Bits63, 2)] {
             for permute in PERMUTATIONS.into_iter().filter(|permute| words == 1 || *permute == 1) {
                 let what = format!("{name}, {bits:?}, permuted {permute}");
-                let mut trees = Vec::new();
-                for members in [tree_members::MOVING, tree_members::FIXED] {
+                let alones = &mut alones[permute as usize];
+                let mut mirrors = Vec::new();
+                for (members, alone) in [tree_members::MOVING, tree_members::FIXED].into_iter().zip(&mut *alones) {
                     let tree = TreeOf { count: aabbs.len(), words, members };
-                    let mut alone = Alone::new(permute);
-                    tree.put(&mut alone);
-                    prepare(&mut alone, &old, &step, &Control::zeroed());
-                    tree.build(&mut alone);
-                    tree.refit(&mut alone);
+                    tree.put(alone);
+                    prepare(alone, &old, &step, &Control::zeroed());
+                    tree.build(alone);
+                    tree.refit(alone);
                     let mut mirror = lbvh::Tree::new(&old, bits, members);
                     mirror.link_parents();
                     mirror.assert_well_formed(&old);
-                    check_tree(&alone, &mirror, words, &format!("{what}, members {members}"));
+                    check_tree(alone, &mirror, words, &format!("{what}, members {members}"));
                     // As they are now.
                     alone.put("aabbs", &aabbs);
-                    tree.refit(&mut alone);
+                    tree.refit(alone);
                     mirror.refit(&boxes);
                     mirror.assert_well_formed(&boxes);
-                    check_tree(&alone, &mirror, words, &format!("{what}, members {members}, refitted"));
-                    trees.push((alone, mirror));
+                    check_tree(alone, &mirror, words, &format!("{what}, members {members}, refitted"));
+                    mirrors.push(mirror);
                 }
                 for (traversal, pairs, across) in WALKS {
                     let what = format!("{what}, {traversal:?}");
-                    let found = lbvh::find_pairs(&trees[0].1, &trees[1].1, &boxes, traversal, u32::MAX);
+                    let found = lbvh::find_pairs(&mirrors[0], &mirrors[1], &boxes, traversal, u32::MAX);
                     assert!(found.pairs == expected.pairs, "{what}: mirror");
                     let groups = groups(aabbs.len());
-                    let (moving, fixed) = trees.split_at_mut(1);
-                    let [(moving, _), (fixed, _)] = [&mut moving[0], &mut fixed[0]];
+                    let [moving, fixed] = &mut *alones;
                     prepare(moving, &boxes, &step, &Control::zeroed());
                     moving.run(|chain| chain.pass("broadphase/lbvh", pairs, groups));
                     // What the first tree found goes on in the second one's buffers.
@@ -327,6 +327,7 @@ fn shifted(aabb: &Aabb, salt: usize) -> Aabb {
 
 #[test]
 fn a_tree_of_the_large_ones_goes_with_a_grid() {
+    let mut alones = PERMUTATIONS.map(Alone::new);
     let mut in_trees = 0;
     for (name, aabbs) in crowds() {
         let boxes = Boxes::new(&aabbs);
@@ -337,11 +338,10 @@ fn a_tree_of_the_large_ones_goes_with_a_grid() {
         let chosen = grid::choose(&boxes, &step);
         let cells = grid::fill(&chosen, &boxes, &step);
         in_trees += cells.large.len();
-        for ((traversal, pairs, across), permute) in WALKS.into_iter().zip(PERMUTATIONS) {
-            let what = format!("{name}, {traversal:?}, permuted {permute}");
+        for ((traversal, pairs, across), mut alone) in WALKS.into_iter().zip(&mut alones) {
+            let what = format!("{name}, {traversal:?}");
             let found = grid::find_pairs(&chosen, &cells, &boxes, Large::Tree(traversal), u32::MAX);
             assert!(found.pairs == expected.pairs, "{what}: mirror");
-            let mut alone = Alone::new(permute);
             let tree = TreeOf { count: aabbs.len(), words: 1, members: tree_members::LARGE };
             tree.put(&mut alone);
             prepare(&mut alone, &boxes, &step, &Control::zeroed());

@@ -2,7 +2,7 @@
 
 use super::{Boxes, Found, brute_force, grid, lbvh, sweep};
 use tumble_core::edit::Stale;
-use tumble_core::layout::{Aabb, StepParams, TreeNode, tree_members};
+use tumble_core::layout::{StepParams, tree_members};
 use tumble_core::wear::Wear;
 use tumble_core::{Broadphase, MortonBits, Params, Traversal};
 
@@ -93,17 +93,3 @@ impl Finder {
 
 /// So many colliders outside the grid are tested against all; more get a tree.
 const LIST: usize = 64;
-
-impl grid::Cells {
-    fn bytes(&self) -> u64 {
-        (4 * self.start.len() + size_of::<Aabb>() * self.entries.len() + 4 * self.large.len()) as u64
-    }
-}
-
-impl lbvh::Tree {
-    /// Bytes of all arrays.
-    fn bytes(&self) -> u64 {
-        let leaf = 8 + 4 + 2 * size_of::<TreeNode>() + 4 + 2 * 24;
-        (leaf * self.members.len() + 4 * self.parents.len()) as u64
-    }
-}

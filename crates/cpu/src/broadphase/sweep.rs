@@ -9,6 +9,7 @@
 //! is left goes to extra items, numbered by a scan: where boxes are short there are none, and nothing to search.
 
 use super::{Boxes, Found, bounded, center, collect, meets};
+use crate::primitives::radix_sort_by;
 use rayon::prelude::*;
 use std::ops::Range;
 use tumble_core::layout::Aabb;
@@ -77,7 +78,7 @@ fn key(x: f32) -> u32 {
 pub fn sort(boxes: &Boxes, axis: usize) -> Sorted {
     let with_key = |(i, aabb): (usize, &Aabb)| bounded(aabb).then(|| u64::from(key(aabb.min[axis])) << 32 | i as u64);
     let mut order: Vec<u64> = boxes.aabbs.par_iter().enumerate().with_min_len(2048).filter_map(with_key).collect();
-    order.par_sort_unstable();
+    radix_sort_by(&mut order, &mut Vec::new(), 32..64, |both| *both);
     let entry = |&both: &u64| Aabb { class: both as u32, ..boxes.aabbs[both as u32 as usize] };
     let keys = order.iter().map(|both| (both >> 32) as u32).collect();
     let boxes: Vec<Aabb> = order.par_iter().with_min_len(2048).map(entry).collect();
