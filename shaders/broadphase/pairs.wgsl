@@ -21,7 +21,7 @@ fn gate(@builtin(local_invocation_index) lid: u32) {
         let listed = atomicLoad(&counters[CONTROL_LARGE_COUNT]);
         if listed > UNBOUNDED_LIMIT {
             stop(OVERFLOW_UNBOUNDED, listed);
-        } else if atomicLoad(&counters[CONTROL_OVERFLOW]) == OVERFLOW_TURNS {
+        } else if atomicLoad(&counters[CONTROL_OVERFLOW]) != OVERFLOW_NONE {
             atomicStore(&counters[CONTROL_STOP], 1u); // needed was written where it was found
         } else if pairs > step.pair_capacity {
             stop(OVERFLOW_PAIRS, pairs);

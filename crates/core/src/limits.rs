@@ -25,6 +25,9 @@ pub const SLICE_LIMIT: u32 = 65_536;
 /// Candidates that one turn of work of the sweep looks at.
 pub const SWEEP_CHUNK: u32 = 256;
 
+/// Most such turns of all colliders together: 7e10 candidates, seconds on any GPU.
+pub const SWEEP_ITEM_LIMIT: u32 = 1 << 28;
+
 /// How large the grid's cell table is for `colliders` colliders: log2 of at least two cells each.
 pub fn cell_table_bits(colliders: u32) -> u32 {
     (colliders.max(1) * 2).next_power_of_two().trailing_zeros().clamp(6, 24)
