@@ -84,7 +84,7 @@ const FAR: Vec3 = Vec3::new(16_000.0 / 7.0, -24_000.0 / 7.0, 48_000.0 / 7.0);
 /// `bodies` boxes and balls in turn, every sixteenth fixed; no gravity and no floor. The cube (square, line) is so large
 /// that a body's box meets about five others.
 pub fn crowd(kind: Crowd, bodies: usize) -> Scene {
-    let mut random = Random::new(0x6372_6f77_64);
+    let mut random = Random::new(0x63_726f_7764);
     let mut scene = Scene::new();
     scene.gravity = Vec3::ZERO;
     let [small, large] = kind.sizes();

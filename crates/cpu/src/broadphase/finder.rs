@@ -1,6 +1,6 @@
 //! Runs the broad phase that was asked for, and keeps what outlives a step: trees.
 
-use super::{Boxes, Found, brute_force, grid, lbvh};
+use super::{Boxes, Found, brute_force, grid, lbvh, sweep};
 use tumble_core::edit::Stale;
 use tumble_core::layout::{StepParams, tree_members};
 use tumble_core::wear::Wear;
@@ -41,6 +41,10 @@ impl Finder {
                 self.wear.walked(step.step, found.turns);
                 self.bytes = self.moving.bytes() + self.fixed.bytes();
                 found
+            }
+            Broadphase::SweepAndPrune => {
+                self.bytes = sweep::BYTES * boxes.aabbs.len() as u64;
+                sweep::find_pairs(boxes, most)
             }
             kind => {
                 let mut grid = grid::choose(boxes, step);

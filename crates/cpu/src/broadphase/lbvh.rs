@@ -202,7 +202,7 @@ impl Tree {
         // What hangs to the right of the way from the leaf to the root, from the leaf up.
         let (mut top, mut turns) = (first, 0);
         while top != NO_NODE && turns <= TURN_LIMIT {
-            turns += self.walk(top, own, traversal, &mut offer);
+            turns = self.walk(top, own, traversal, turns, &mut offer);
             top = self.nodes[top as usize].escape;
         }
         turns
@@ -211,22 +211,24 @@ impl Tree {
     /// Pairs of collider `i`, which is not in the tree, with all leaves; returns the turns that it took.
     pub(super) fn partners_of(&self, boxes: &Boxes, i: u32, traversal: Traversal, sink: &mut Sink) -> u32 {
         let own = &boxes.aabbs[i as usize];
-        self.walk(root_of(self.count()), own, traversal, &mut |j| {
+        let mut offer = |j: u32| {
             if matter(own.body, boxes.aabbs[j as usize].body) {
                 sink.push(i, j);
             }
-        })
+        };
+        match (root_of(self.count()), traversal) {
+            (NO_NODE, _) => 0,
+            (root, Traversal::Escape) => self.walk_by_escapes(root, NO_NODE, own, &mut offer),
+            (root, _) => self.walk(root, own, traversal, 0, &mut offer),
+        }
     }
 
-    /// Offers the colliders of all leaves below node `top` whose boxes overlap `own`; returns the turns that it took.
-    fn walk(&self, top: u32, own: &Aabb, traversal: Traversal, offer: &mut impl FnMut(u32)) -> u32 {
-        if top == NO_NODE {
-            return 0;
-        }
+    /// Offers the colliders of all leaves below node `top` whose boxes overlap `own`; returns the turns, those `before`
+    /// included.
+    fn walk(&self, top: u32, own: &Aabb, traversal: Traversal, before: u32, offer: &mut impl FnMut(u32)) -> u32 {
         match traversal {
-            Traversal::History => self.walk_by_history(top, own, offer),
-            Traversal::Stack => self.walk_with_stack(top, own, offer),
-            _ => self.walk_by_escapes(top, self.nodes[top as usize].escape, own, offer),
+            Traversal::Stack => self.walk_with_stack(top, own, before, offer),
+            _ => self.walk_by_history(top, own, before, offer),
         }
     }
 
@@ -249,18 +251,21 @@ impl Tree {
         turns
     }
 
-    /// Bit k of `pending` tells that the right child at level k below `top` is still to be seen.
-    fn walk_by_history(&self, top: u32, own: &Aabb, offer: &mut impl FnMut(u32)) -> u32 {
-        let (mut next, mut level, mut pending, mut turns) = (top, 0u32, 0u128, 1);
+    /// Bit k of `pending` tells that the right child at level k below `top` is still to be seen. One loop, as the shader
+    /// must have it: a turn goes down to a child, or up to the parent or over to the sibling.
+    fn walk_by_history(&self, top: u32, own: &Aabb, before: u32, offer: &mut impl FnMut(u32)) -> u32 {
+        let (mut next, mut level, mut pending, mut turns) = (top, 0u32, 0u128, before + 1);
+        let mut rising = false;
         let query = Query::new(own);
         if !self.enters(top, &query) {
             return turns;
         }
         while turns <= TURN_LIMIT {
             turns += 1;
-            if next % 2 == 0 {
+            if !rising && next % 2 == 0 {
                 offer(self.nodes[next as usize].child);
-            } else {
+                rising = true;
+            } else if !rising {
                 let left = self.nodes[next as usize].child;
                 let right = self.nodes[left as usize].escape;
                 let (to_left, to_right) = (self.enters(left, &query), self.enters(right, &query));
@@ -270,23 +275,27 @@ impl Tree {
                     next = if to_left { left } else { right };
                     continue;
                 }
-            }
-            while level > 0 && pending >> level & 1 == 0 {
-                turns += 1;
-                level -= 1;
-                next = self.parents[next as usize];
+                rising = true;
             }
             if level == 0 {
                 break;
             }
-            pending &= !(1 << level);
-            next = self.nodes[next as usize].escape;
+            if pending >> level & 1 == 1 {
+                pending &= !(1 << level);
+                next = self.nodes[next as usize].escape;
+                rising = false;
+            } else {
+                level -= 1;
+                next = self.parents[next as usize];
+            }
         }
         turns
     }
 
-    fn walk_with_stack(&self, top: u32, own: &Aabb, offer: &mut impl FnMut(u32)) -> u32 {
-        let (mut next, mut stack, mut depth, mut turns) = (top, [0u32; STACK], 0, 1);
+    /// Where the stack is full, the subtree is walked by escapes, up to node `end`.
+    fn walk_with_stack(&self, top: u32, own: &Aabb, before: u32, offer: &mut impl FnMut(u32)) -> u32 {
+        let (mut next, mut stack, mut depth, mut turns) = (top, [0u32; STACK], 0, before + 1);
+        let (mut escaping, mut end) = (false, NO_NODE);
         let query = Query::new(own);
         if !self.enters(top, &query) {
             return turns;
@@ -294,28 +303,33 @@ impl Tree {
         while turns <= TURN_LIMIT {
             turns += 1;
             let node = &self.nodes[next as usize];
-            if next % 2 == 0 {
+            if escaping {
+                let inside = query.overlaps(node);
+                if inside && next % 2 == 0 {
+                    offer(node.child);
+                }
+                next = if inside && next % 2 == 1 { node.child } else { node.escape };
+                if next != end {
+                    continue;
+                }
+                escaping = false;
+            } else if next % 2 == 0 {
                 offer(node.child);
             } else {
                 let left = node.child;
                 let right = self.nodes[left as usize].escape;
-                match (self.enters(left, &query), self.enters(right, &query)) {
-                    (true, true) if depth == STACK => turns += self.walk_by_escapes(left, node.escape, own, offer),
-                    (true, true) => {
-                        stack[depth] = right;
-                        depth += 1;
-                        next = left;
-                        continue;
-                    }
-                    (true, false) => {
-                        next = left;
-                        continue;
-                    }
-                    (false, true) => {
-                        next = right;
-                        continue;
-                    }
-                    (false, false) => {}
+                let (to_left, to_right) = (self.enters(left, &query), self.enters(right, &query));
+                if to_left && to_right && depth == STACK {
+                    (escaping, end, next) = (true, node.escape, left);
+                    continue;
+                }
+                if to_left && to_right {
+                    stack[depth] = right;
+                    depth += 1;
+                }
+                if to_left || to_right {
+                    next = if to_left { left } else { right };
+                    continue;
                 }
             }
             if depth == 0 {

@@ -8,6 +8,7 @@ mod collect;
 mod finder;
 pub mod grid;
 pub mod lbvh;
+pub mod sweep;
 
 pub(crate) use collect::{Sink, collect};
 pub(crate) use finder::{Finder, Search};
@@ -16,7 +17,7 @@ use crate::bounds::{FAR, size_class};
 use bytemuck::NoUninit;
 use rayon::prelude::*;
 use tumble_core::layout::{Aabb, aabb_body};
-use tumble_core::limits::{TURN_LIMIT, UNBOUNDED_LIMIT};
+use tumble_core::limits::{SWEEP_ITEM_LIMIT, TURN_LIMIT, UNBOUNDED_LIMIT};
 use wide::f32x4;
 
 /// Size classes that a float's exponent and two mantissa bits can tell apart.
@@ -85,6 +86,8 @@ pub struct Found {
     pub most_turns: u32,
     /// Turns of all, modulo 2^32.
     pub turns: u32,
+    /// Items of work of the sweep. When these are too many, nothing else was looked for.
+    pub items: u64,
 }
 
 impl Found {
@@ -102,6 +105,8 @@ pub enum TooMany {
     Turns(u32),
     /// So many colliders without end.
     Unbounded(u32),
+    /// So many items of work of the sweep.
+    Items(u64),
 }
 
 /// Whether a shader's loops would pass their bounds.
@@ -109,6 +114,9 @@ pub fn too_many(boxes: &Boxes, found: &Found) -> Option<TooMany> {
     let unbounded = boxes.unbounded.len() as u32;
     if unbounded > UNBOUNDED_LIMIT {
         return Some(TooMany::Unbounded(unbounded));
+    }
+    if found.items > SWEEP_ITEM_LIMIT.into() {
+        return Some(TooMany::Items(found.items));
     }
     (found.most_turns > TURN_LIMIT).then_some(TooMany::Turns(found.most_turns))
 }
