@@ -11,7 +11,7 @@ use tumble_core::layout::{Aabb, StepParams, aabb_body, tree_members};
 use tumble_core::scenes::{Crowd, crowd};
 use tumble_core::{MortonBits, Traversal, limits};
 use tumble_cpu::bounds::{FAR, size_class};
-use tumble_cpu::broadphase::{Boxes, Found, bounded, brute_force, grid, lbvh, matter};
+use tumble_cpu::broadphase::{Boxes, Found, bounded, brute_force, grid, lbvh, matter, sweep};
 
 const COUNTS: [usize; 6] = [0, 1, 2, 3, 257, 2000];
 const TRAVERSALS: [Traversal; 3] = [Traversal::Escape, Traversal::History, Traversal::Stack];
@@ -63,6 +63,7 @@ fn every_broad_phase(boxes: &Boxes, step: &StepParams, most: u32) -> Vec<(String
     for bits in BITS {
         all.extend(walks(&trees(boxes, bits), boxes, most));
     }
+    all.push(("sweep".into(), sweep::find_pairs(boxes, most)));
     all
 }
 
@@ -233,6 +234,7 @@ fn a_hundred_thousand_bodies() {
         for bits in BITS {
             same(&what, &walks(&trees(&boxes, bits), &boxes, u32::MAX), &pairs);
         }
+        same(&what, &[("sweep".into(), sweep::find_pairs(&boxes, u32::MAX))], &pairs);
         if kind == Crowd::Uniform {
             same(&what, &[("brute force".into(), brute_force::find_pairs(&boxes, u32::MAX))], &pairs);
             same(&what, &grids(&boxes, &cloud.step, &[grid::Large::List], u32::MAX), &pairs);

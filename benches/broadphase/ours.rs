@@ -4,7 +4,7 @@ use crate::{Sample, Watch};
 use tumble_core::layout::{Aabb, StepParams, tree_members};
 use tumble_core::wear::Wear;
 use tumble_core::{MortonBits, Traversal, limits};
-use tumble_cpu::broadphase::{Boxes, brute_force, grid, lbvh};
+use tumble_cpu::broadphase::{Boxes, brute_force, grid, lbvh, sweep};
 
 const MOST: u32 = 1 << 30;
 
@@ -15,6 +15,15 @@ pub(crate) fn brute_force(aabbs: &[Aabb]) -> Sample {
     let found = brute_force::find_pairs(&boxes, MOST);
     watch.lap();
     watch.sample(found.count, 0)
+}
+
+pub(crate) fn sweep(aabbs: &[Aabb]) -> Sample {
+    let mut watch = Watch::new();
+    let boxes = Boxes::new(aabbs);
+    watch.lap();
+    let found = sweep::find_pairs(&boxes, MOST);
+    watch.lap();
+    watch.sample(found.count, sweep::BYTES * aabbs.len() as u64)
 }
 
 /// `tree`: an eighth of the colliders may be larger than a cell and go into a tree; else a few, all tested against.

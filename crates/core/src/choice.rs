@@ -19,6 +19,8 @@ pub struct Spread {
     pub elongation: f32,
     /// Cells of the median size in the box around all, for each collider.
     pub sparsity: f32,
+    /// Colliders that begin within one mean size along the longest axis: what a sweep compares each with.
+    pub abreast: f32,
 }
 
 impl Spread {
@@ -46,6 +48,7 @@ impl Spread {
         if count == 0 {
             return Self::default();
         }
+        let mean = sizes.iter().map(|&size| f64::from(size)).sum::<f64>() / count as f64;
         let mut nth = |n: usize| *sizes.select_nth_unstable_by(n, f32::total_cmp).1;
         let median = nth(count / 2).max(f32::MIN_POSITIVE);
         let largest = nth(count - 1 - (large_limit(count as u32, false) as usize).min(count - 1));
@@ -58,6 +61,7 @@ impl Spread {
             size_ratio: largest / median,
             elongation: axes[2] / axes[1],
             sparsity: axes[0] * axes[1] * axes[2] / count as f32,
+            abreast: (count as f64 * mean / f64::from(extent.max_element().max(0.0)).max(mean)) as f32,
         }
     }
 
@@ -67,14 +71,26 @@ impl Spread {
     }
 }
 
+/// Up to so many colliders, hardly anything is faster than testing each against all.
+const FEW: u32 = 128;
+/// Up to so many colliders abreast, a sweep is faster than a grid.
+const ABREAST: f32 = 200.0;
+/// The same where a grid has no say, and a tree is slower.
+const ABREAST_OF_TREE: f32 = 800.0;
+
 impl Broadphase {
     /// What `Auto` stands for in a scene like this; anything else stands for itself.
+    ///
+    /// The rule, measured on the CPU (`docs/broadphase.md`): up to 128 colliders each is tested against all. Else a sweep, as
+    /// long as few lie abreast along the longest axis: 200, or 800 where sizes differ more than fourfold. Beyond, a tree where
+    /// sizes differ so, and a grid where they do not.
     pub fn resolve(self, spread: &Spread) -> Self {
-        match self {
-            Self::Auto if spread.colliders <= 64 => Self::BruteForce,
-            Self::Auto if spread.is_wide() => Self::Lbvh,
-            Self::Auto => Self::Grid,
-            named => named,
+        match (self, spread.is_wide()) {
+            (Self::Auto, _) if spread.colliders <= FEW => Self::BruteForce,
+            (Self::Auto, wide) if spread.abreast <= if wide { ABREAST_OF_TREE } else { ABREAST } => Self::SweepAndPrune,
+            (Self::Auto, true) => Self::Lbvh,
+            (Self::Auto, false) => Self::Grid,
+            (named, _) => named,
         }
     }
 }

@@ -17,7 +17,7 @@ use tumble_core::limits::{SWEEP_CHUNK, SWEEP_ITEM_LIMIT};
 use wide::f32x8;
 
 /// Bytes of all arrays a collider: keys with colliders, boxes and their sides, ends, offsets.
-pub(super) const BYTES: u64 = 12 + size_of::<Aabb>() as u64 + 16 + 4 + 4;
+pub const BYTES: u64 = 12 + size_of::<Aabb>() as u64 + 16 + 4 + 4;
 
 /// Colliders along the axis.
 #[derive(Debug, Clone, Default)]
