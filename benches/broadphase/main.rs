@@ -79,6 +79,9 @@ fn median(times: impl Iterator<Item = f64>) -> f64 {
 /// What stands for all rounds: the median, or the fastest where others use the machine too.
 static FASTEST: AtomicBool = AtomicBool::new(false);
 
+/// What runs once on the boxes of a step.
+type Steady<'a> = Box<dyn FnMut(&[Aabb]) -> Sample + 'a>;
+
 /// Name, and what runs once more.
 type Contestant<'a> = (&'static str, Box<dyn FnMut() -> Sample + 'a>);
 
@@ -189,7 +192,7 @@ fn steady(kind: Crowd, count: usize, cloud: &mut Cloud, rounds: usize) -> Vec<Ro
     let mut rapier = Rapier::new(&first, 1.0);
     rapier.first();
     let (step, turns) = (cloud.step, std::cell::Cell::new(0));
-    let mut runs: Vec<(&'static str, Box<dyn FnMut(&[Aabb]) -> Sample>)> = vec![
+    let mut runs: Vec<(&'static str, Steady)> = vec![
         ("grid, list", Box::new(move |f| ours::grid(f, &step, false, false))),
         ("grid, tree", Box::new(move |f| ours::grid(f, &step, false, true))),
         ("sliced, list", Box::new(move |f| ours::grid(f, &step, true, false))),

@@ -51,7 +51,8 @@ impl Panel<'_> {
             text += &format!("<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{y} ms</text>\n", left - 6.0, at + 4.0);
         }
         for (what, color) in COLORS {
-            let line: Vec<_> = points.iter().filter(|(_, row)| row.what == what).collect();
+            let mut line: Vec<_> = points.iter().filter(|(_, row)| row.what == what).collect();
+            line.sort_by(|a, b| a.0.total_cmp(&b.0));
             let path: Vec<String> =
                 line.iter().map(|(x, row)| self.at(*x, row.total)).map(|(x, y)| format!("{x:.1} {y:.1}")).collect();
             text += &format!("<path d=\"M{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"2\"/>\n", path.join("L"));

@@ -1,7 +1,7 @@
 //! The broad phase that a scene calls for. Oracle: `docs/broadphase.md`, whose table was measured.
 
 use tumble_core::glam::Vec3;
-use tumble_core::scenes::{self, Crowd, crowd};
+use tumble_core::scenes::{Crowd, crowd};
 use tumble_core::{Broadphase, ColliderBuilder, RigidBodyBuilder, Scene, Spread};
 
 fn auto(scene: &Scene) -> Broadphase {
@@ -10,20 +10,25 @@ fn auto(scene: &Scene) -> Broadphase {
 
 #[test]
 fn crowds_get_what_suits_them() {
+    use Broadphase::{BruteForce, Grid, Lbvh, SweepAndPrune};
     for kind in Crowd::ALL {
-        let wide = matches!(kind, Crowd::Ratio(_) | Crowd::Liu);
-        let many = if wide { Broadphase::Lbvh } else { Broadphase::Grid };
-        for count in [2000, 20_000] {
-            assert_eq!(auto(&crowd(kind, count)), many, "{kind} of {count}: {:?}", Spread::of(&crowd(kind, count)));
+        for count in [0, 1, 50, 128] {
+            assert_eq!(auto(&crowd(kind, count)), BruteForce, "{kind} of {count}");
         }
-        for count in [0, 1, 50] {
-            assert_eq!(auto(&crowd(kind, count)), Broadphase::BruteForce, "{kind} of {count}");
+        let expected = match kind {
+            Crowd::Line => [SweepAndPrune; 3],
+            Crowd::OnePoint => [Grid; 3],
+            Crowd::Ratio(1000.0) => [SweepAndPrune; 3],
+            Crowd::Ratio(_) | Crowd::Liu => [SweepAndPrune, SweepAndPrune, Lbvh],
+            Crowd::Clustered | Crowd::Plane | Crowd::Fast => [SweepAndPrune, SweepAndPrune, Grid],
+            _ => [SweepAndPrune, Grid, Grid],
+        };
+        for (count, expected) in [1000, 10_000, 100_000].into_iter().zip(expected) {
+            let scene = crowd(kind, count);
+            println!("{kind} of {count}: {:?}", Spread::of(&scene));
+            assert_eq!(auto(&scene), expected, "{kind} of {count}: {:?}", Spread::of(&scene));
         }
     }
-    for scene in scenes::ALL.iter().filter(|scene| scene.name != "column") {
-        assert_eq!(auto(&(scene.build)(scene.default_bodies)), Broadphase::Grid, "{}", scene.name);
-    }
-    assert_eq!(auto(&scenes::column(20)), Broadphase::BruteForce);
 }
 
 #[test]
@@ -49,7 +54,8 @@ fn a_spread_is_what_it_says() {
         let place = Vec3::new(3.0 * (i % 10) as f32, 5.0, 3.0 * (i / 10) as f32);
         scene.insert(RigidBodyBuilder::dynamic().translation(place), ColliderBuilder::ball(0.5));
     }
-    let spread = Spread { all: 41, colliders: 40, size_ratio: 1.0, elongation: 3.0, sparsity: 27.0 * 9.0 / 40.0 };
+    let (sparsity, abreast) = (27.0 * 9.0 / 40.0, 40.0 / 27.0);
+    let spread = Spread { all: 41, colliders: 40, size_ratio: 1.0, elongation: 3.0, sparsity, abreast };
     assert_eq!(Spread::of(&scene), spread);
     // Eight large ones are a few; a ninth is not.
     for i in 0..9 {
@@ -62,13 +68,27 @@ fn a_spread_is_what_it_says() {
     assert!(Spread::of(&scene).is_wide());
 }
 
-/// Where the sizes begin to need a tree.
+/// Where the sizes begin to need a tree, and where too many lie abreast for a sweep. Oracle: analysis.
 #[test]
-fn wide_begins_above_four() {
-    let spread = |ratio: f32| {
-        Spread::from_sizes((0..1000).map(|i| if i < 100 { ratio } else { 1.0 }).collect(), Vec3::splat(30.0))
+fn bounds_of_the_rule() {
+    // A tenth of the colliders is larger.
+    let spread = |count: u32, ratio: f32, extent: f32| {
+        let sizes = (0..count).map(|i| if i % 10 == 0 { ratio } else { 1.0 });
+        Spread::from_sizes(sizes.collect(), Vec3::splat(extent))
     };
-    assert!(!spread(4.0).is_wide() && spread(4.01).is_wide());
-    assert_eq!(Broadphase::Auto.resolve(&spread(4.0)), Broadphase::Grid);
-    assert_eq!(Broadphase::Auto.resolve(&spread(4.01)), Broadphase::Lbvh);
+    let auto = |spread: Spread| Broadphase::Auto.resolve(&spread);
+    let (at, above) = (spread(1000, 4.0, 1.0), spread(1000, 4.01, 1.0));
+    assert!(!at.is_wide() && above.is_wide());
+    assert_eq!([auto(at), auto(above)], [Broadphase::Grid, Broadphase::Lbvh]);
+    assert_eq!(
+        [spread(128, 1.0, 1e4), spread(129, 1.0, 1e4)].map(auto),
+        [Broadphase::BruteForce, Broadphase::SweepAndPrune]
+    );
+    // 200 abreast, and a few more; with a mean size of 2 m, 800.
+    let sizes = [spread(2000, 1.0, 10.0), spread(2000, 1.0, 9.9)];
+    assert_eq!(sizes.map(|s| s.abreast.round()), [200.0, 202.0]);
+    assert_eq!(sizes.map(auto), [Broadphase::SweepAndPrune, Broadphase::Grid]);
+    let wide = [spread(2000, 11.0, 5.0), spread(2000, 11.0, 4.9)];
+    assert_eq!(wide.map(|s| s.abreast.round()), [800.0, 816.0]);
+    assert_eq!(wide.map(auto), [Broadphase::SweepAndPrune, Broadphase::Lbvh]);
 }
