@@ -368,7 +368,12 @@ fn loops_have_bounds() {
     // One plate on the floor carries them all: each of 62 rounds places one of its contacts, the rest is left.
     let hub = scenes::hub(limits::LAST_LIMIT as usize + 200);
     for (name, scene, pairs, expected) in [
-        ("crowded", crowded, 1000, Error::Capacity { buffer: "partners", needed: u64::from(specks) - 1, capacity: 50_000 }),
+        (
+            "crowded",
+            crowded,
+            1000,
+            Error::Capacity { buffer: "partners", needed: u64::from(specks) - 1, capacity: 50_000 },
+        ),
         ("endless", endless, 1000, Error::Capacity { buffer: "half-spaces", needed: 8193, capacity: 8192 }),
         ("hub", hub, 70_000, Error::Capacity { buffer: "last batch", needed: 32_907, capacity: 32_768 }),
     ] {

@@ -8,6 +8,7 @@ const NO_NODE: u32 = 0xffffffffu;
 const MEMBERS_MOVING: u32 = 0u;
 const MEMBERS_FIXED: u32 = 1u;
 const MEMBERS_LARGE: u32 = 2u;
+const MEMBERS_ALL: u32 = 3u;
 
 struct TreeNode {
     min: vec3<f32>,

@@ -42,6 +42,8 @@ pub mod tree_members {
     pub const FIXED: u32 = 1;
     /// Bounded colliders larger than a cell of the grid.
     pub const LARGE: u32 = 2;
+    /// All bounded colliders.
+    pub const ALL: u32 = 3;
 }
 
 /// The root of a tree of so many leaves.

@@ -17,9 +17,9 @@
 
 use super::{Boxes, CLASSES, Found, Sink, bounded, center, collect, lbvh, matter, overlaps};
 use std::ops::Range;
-use tumble_core::{MortonBits, Traversal};
 use tumble_core::layout::{Aabb, StepParams};
 use tumble_core::limits::SLICE_LIMIT;
+use tumble_core::{MortonBits, Traversal};
 
 /// How the grid lies in one step.
 #[derive(Debug, Clone, PartialEq, Default)]
