@@ -4,7 +4,8 @@
 //   quarantine       one thread a body: one whose state is not finite (or past STATE_LIMIT) stands still at the pose
 //                    that it had when the last step committed. Reads states; writes work_states, names it in counters.
 //   collider_bounds  one thread a collider. Reads colliders, work_states, props; writes aabbs, counts size classes in
-//                    class_histogram, and the range of the boxes' middles in counters: per workgroup, then once.
+//                    class_histogram, and the range of the boxes' middles in counters: per workgroup, then once; those
+//                    without end go to large_list, in no order.
 //
 // The box is swept by the body's predicted motion (velocity, gravity and force over the step, and the arc of its
 // rotation) and widened by half the speculative distance, so that boxes overlap wherever a contact may be needed.
@@ -27,6 +28,7 @@ const STATE_LIMIT: f32 = 1e9;
 @group(0) @binding(5) var<storage, read_write> aabbs: array<Aabb>;
 @group(0) @binding(6) var<storage, read_write> class_histogram: array<atomic<u32>>;
 @group(0) @binding(7) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(8) var<storage, read_write> large_list: array<u32>;
 
 var<workgroup> classes: array<atomic<u32>, CLASSES>;
 var<workgroup> low: array<atomic<u32>, 3>; // complements, so that zero is where a minimum begins
@@ -93,6 +95,8 @@ fn collider_bounds(
                 atomicMax(&low[axis], ~place);
                 atomicMax(&high[axis], place);
             }
+        } else if (aabb.body & AABB_LIVE) != 0u {
+            large_list[atomicAdd(&counters[CONTROL_LARGE_COUNT], 1u)] = i;
         }
     }
     workgroupBarrier();

@@ -99,7 +99,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         EditRecord { op, target, kind, generation, data }
         EditRange { first, count }
         TreeNode { min, child, max, escape }
-        TreeInfo { count, members, words, capacity }
+        TreeInfo { slots, members, words, capacity }
         PlacedShape { position, shape, rotation, size, pad_a }
         QueryRay { origin, max_distance, direction, solid, inverse, pad_a }
         QueryVolume { min, pad_a, max, pad_b, placed }
@@ -139,7 +139,7 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
             SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, COLLIDER,
             COLLIDER_REMOVE
         }
-        query_word as "QUERY_" { UNBOUNDED, LEAVES, TURNS, TOTAL, COUNT }
+        query_word as "QUERY_" { UNBOUNDED, TURNS, TOTAL, COUNT }
         tree_members as "MEMBERS_" { MOVING, FIXED, LARGE, ALL }
         ;
         BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT, NO_NODE, NO_COLLIDER

@@ -1,4 +1,4 @@
-//! Stages `edit`, `bounds` and `broadphase/grid`, each pass alone: the GPU computes what the CPU does, in every order
+//! Stages `edit` and `bounds`, each pass alone: the GPU computes what the CPU does, in every order
 //! of invocations. Oracle: the mirror, which makes the inputs too.
 //!
 //! Tolerances are shares of the largest number of a field in one element, or of 1; beside each is the largest error
@@ -8,6 +8,8 @@
 #[path = "common/alone.rs"]
 mod alone;
 mod common;
+#[path = "common/crowds.rs"]
+mod crowds;
 #[path = "common/floats.rs"]
 mod floats;
 #[path = "common/frame.rs"]
@@ -17,23 +19,21 @@ mod random;
 
 use alone::Alone;
 use bytemuck::Zeroable;
+use crowds::counted;
 use floats::Floats;
 use frame::scene_of;
 use random::{Crowd, Random, step_of};
 use tumble_core::edit::EditBatch;
-use tumble_core::glam::Vec3;
 use tumble_core::layout::*;
-use tumble_core::{ColliderBuilder, Editor, PackedScene, Pose, RigidBodyBuilder, limits};
+use tumble_core::{ColliderBuilder, Editor, PackedScene, Pose, RigidBodyBuilder};
 use tumble_cpu::bounds::{self, FAR, STATE_LIMIT, size_class};
-use tumble_cpu::broadphase::grid::{self, CLASSES};
+use tumble_cpu::broadphase::{Boxes, CLASSES};
 use tumble_cpu::edit;
-use tumble_gpu::primitives::{Count, Scan, ScanOptions, Sort, SortOptions};
 
 const PERMUTATIONS: [u32; 3] = [0, 1, 2];
 const SIZES: [usize; 7] = [0, 1, 2, 255, 256, 257, 3000];
 const GARBAGE: u32 = 0xdead_beef;
-/// Words of `Control`.
-const PAIR_COUNT: u32 = 8;
+/// First of the words of `Control` that begin as the highest number.
 const CENTER_MIN: usize = 24;
 
 const EDITED: [(&str, f32); 6] = [
@@ -217,23 +217,6 @@ fn quarantine_takes_the_same_bodies() {
     }
 }
 
-fn to_ordered(x: f32) -> u32 {
-    if x.to_bits() >> 31 == 0 { x.to_bits() | 1 << 31 } else { !x.to_bits() }
-}
-
-/// What `bounds` leaves for the grid: how many boxes of each class, and the range of their middles.
-fn counted(aabbs: &[Aabb]) -> (Vec<u32>, [u32; 3], [u32; 3]) {
-    let (mut histogram, mut low, mut high) = (vec![0; CLASSES], [u32::MAX; 3], [0; 3]);
-    for aabb in aabbs.iter().filter(|a| a.body & aabb_body::LIVE != 0 && a.class < size_class(FAR)) {
-        histogram[aabb.class as usize] += 1;
-        for i in 0..3 {
-            let middle = to_ordered(0.5 * (aabb.min[i] + aabb.max[i]));
-            (low[i], high[i]) = (low[i].min(middle), high[i].max(middle));
-        }
-    }
-    (histogram, low, high)
-}
-
 #[test]
 fn boxes_are_the_same_and_counted() {
     let mut floats = Floats::default();
@@ -251,6 +234,7 @@ fn boxes_are_the_same_and_counted() {
             alone.put("props", &crowd.props);
             alone.put("colliders", &crowd.colliders);
             alone.put("aabbs", &vec![[GARBAGE; 8]; bodies]);
+            alone.put("large_list", &vec![GARBAGE; bodies]);
             alone.run(|chain| chain.pass("bounds", "collider_bounds", groups(bodies)));
             let cpu = crowd.boxes();
             let gpu: Vec<Aabb> = alone.take("aabbs");
@@ -272,160 +256,19 @@ fn boxes_are_the_same_and_counted() {
             let what = format!("{bodies} bodies");
             floats.check(&what, BOX, (&cpu, &gpu), |aabb| near(aabb.min));
             floats.check(&what, BOX, (&cpu, &gpu), |aabb| near(aabb.max));
-            let (histogram, low, high) = counted(&gpu);
-            assert_eq!(alone.take::<u32>("class_histogram"), histogram, "{what}");
+            let boxes = Boxes::new(&gpu);
+            assert_eq!(alone.take::<u32>("class_histogram"), boxes.classes, "{what}");
             let control = alone.take::<Control>("counters")[0];
-            assert_eq!((control.center_min, control.center_max), (low, high), "{what}");
+            let expected = counted(&boxes, &Control::zeroed());
+            assert_eq!(control.center_min, expected.center_min, "{what}");
+            assert_eq!(control.center_max, expected.center_max, "{what}");
+            let mut list: Vec<u32> = alone.take("large_list");
+            list.truncate(control.large_count as usize);
+            list.sort_unstable();
+            assert_eq!(list, boxes.unbounded, "{what}");
         }
     }
     print!("{floats}");
     println!("{other_class} of {all} boxes have another size class");
     assert!(100 * other_class <= all);
-}
-
-fn boxed(center: Vec3, half: Vec3, body: u32) -> Aabb {
-    let (min, max) = (center - half, center + half);
-    let body = body | aabb_body::LIVE | aabb_body::DYNAMIC;
-    Aabb { min: min.to_array(), body, max: max.to_array(), class: size_class((max - min).max_element()) }
-}
-
-/// Boxes of scenes, and such as a grid finds hard.
-fn crowds() -> Vec<(String, Vec<Aabb>)> {
-    let mut random = Random::new(8);
-    let by_size = |bodies| (format!("{bodies} bodies"), Crowd::new(bodies, 7).boxes());
-    let mut all: Vec<_> = SIZES.into_iter().map(by_size).collect();
-    let mut add = |name: &str, count: u32, place: &mut dyn FnMut(&mut Random, u32) -> (Vec3, Vec3)| {
-        let boxes = (0..count).map(|i| {
-            let (center, half) = place(&mut random, i);
-            boxed(center, half, i)
-        });
-        all.push((name.to_owned(), boxes.collect()));
-    };
-    add("one point", 400, &mut |_, _| (Vec3::splat(-3.0), Vec3::splat(0.5)));
-    add("a line", 2000, &mut |_, i| (Vec3::new(0.9 * i as f32 - 700.0, 0.0, 0.0), Vec3::splat(0.5)));
-    add("a plane", 2000, &mut |r, _| (r.vector(30.0).with_y(-1e-30), Vec3::splat(0.5)));
-    add("cell edges", 1000, &mut |r, _| ((r.vector(8.0) * 2.0).round() * 0.5, Vec3::splat(0.25)));
-    add("far away", 1000, &mut |r, _| (r.vector(4.0) + Vec3::new(1e6, -3e6, 1e7), Vec3::splat(0.5)));
-    add("past all cells", 1000, &mut |r, _| (1e9 * r.vector(1.0).round() + r.vector(300.0), Vec3::splat(40.0)));
-    add("many sizes", 2000, &mut |r, _| (r.vector(50.0), Vec3::splat(10f32.powf(r.range(-3.0, 1.5)))));
-    add("as many large ones as may be", 500, &mut |r, i| (r.vector(9.0), Vec3::splat(if i < 8 { 3.0 } else { 0.3 })));
-    add("tiny", 1000, &mut |r, _| (r.vector(1e-3), Vec3::splat(1e-4)));
-    for aabb in &mut all.iter_mut().find(|(name, _)| name == "a plane").unwrap().1[..300] {
-        (aabb.min, aabb.max, aabb.class) = ([-FAR; 3], [FAR, 0.2, FAR], size_class(FAR));
-    }
-    all
-}
-
-/// Fills in what the grid's passes bind, and makes the scans and the sort between them.
-fn prepare(alone: &mut Alone, aabbs: &[Aabb], step: &StepParams, control: &Control) -> (Scan, Scan, Sort) {
-    let cells = (1 << step.cell_table_bits) + 1;
-    let (histogram, center_min, center_max) = counted(aabbs);
-    alone.put("step", &[*step]);
-    alone.put("counters", &[Control { center_min, center_max, ..*control }]);
-    alone.put("class_histogram", &histogram);
-    alone.put("aabbs", aabbs);
-    alone.put("cell_start", &vec![GARBAGE; cells]);
-    alone.put("cell_cursor", &vec![GARBAGE; cells]);
-    for name in ["cell_entries", "large_list", "partner_offset"] {
-        alone.put(name, &vec![GARBAGE; aabbs.len()]);
-    }
-    alone.put("pair_keys", &vec![[GARBAGE; 2]; step.pair_capacity as usize]);
-    alone.put("pair_values", &vec![GARBAGE; step.pair_capacity as usize]);
-    let gpu = common::gpu();
-    let host = |count: u32, total| ScanOptions { capacity: count, count: Count::Host(count), total };
-    let by_pair = SortOptions { capacity: step.pair_capacity, count: Count::Word(PAIR_COUNT), bits: vec![32; 2] };
-    (
-        Scan::new(gpu, &mut alone.pipelines, host(cells as u32, None)).unwrap(),
-        Scan::new(gpu, &mut alone.pipelines, host(aabbs.len() as u32, Some(PAIR_COUNT))).unwrap(),
-        Sort::new(gpu, &mut alone.pipelines, by_pair).unwrap(),
-    )
-}
-
-/// All passes of the grid, one after the other.
-fn run_grid(alone: &mut Alone, aabbs: &[Aabb], step: &StepParams, control: &Control) -> Control {
-    let (scan_cells, scan_pairs, sort) = prepare(alone, aabbs, step, control);
-    let buffer = |name: &str| alone.buffers.buffer(name).unwrap().clone();
-    let [start, offset, keys, values, counters] =
-        ["cell_start", "partner_offset", "pair_keys", "pair_values", "counters"].map(buffer);
-    let by_collider = groups(aabbs.len());
-    alone.run(|chain| {
-        let stem = "broadphase/grid";
-        chain.pass(stem, "choose", 1);
-        chain.pass(stem, "clear", groups((1 << step.cell_table_bits) + 1));
-        chain.pass(stem, "count", by_collider);
-        scan_cells.record(&mut chain.recorder, &start, None).unwrap();
-        chain.pass(stem, "scatter", by_collider);
-        chain.pass(stem, "pair_count", by_collider);
-        scan_pairs.record(&mut chain.recorder, &offset, Some(&counters)).unwrap();
-        chain.pass(stem, "gate", 1);
-        chain.pass(stem, "pair_fill", by_collider);
-        sort.record(&mut chain.recorder, &keys, &values, Some(&counters)).unwrap();
-    });
-    alone.take("counters")[0]
-}
-
-#[test]
-fn the_grid_and_its_pairs_are_the_same() {
-    for (name, aabbs) in crowds() {
-        let mut step = step_of(aabbs.len() as u32);
-        let chosen = grid::choose(&aabbs, &step);
-        let cells = grid::fill(&chosen, &aabbs, &step);
-        let found = grid::find_pairs(&chosen, &cells, &aabbs);
-        step.pair_capacity = found.pairs.len() as u32 + 3;
-        for permute in PERMUTATIONS {
-            let mut alone = Alone::new(permute);
-            let control = run_grid(&mut alone, &aabbs, &step, &Control::zeroed());
-            let what = format!("{name}, permuted {permute}");
-            let [x, y, z] = chosen.bits;
-            assert_eq!(
-                (control.cell_class, control.inverse_cell, control.cell_bits),
-                (chosen.cell_class, chosen.inverse_cell.to_bits(), x | y << 8 | z << 16),
-                "{what}"
-            );
-            assert!(alone.take::<u32>("cell_start") == cells.start, "{what}: cells");
-            let mut entries: Vec<u32> = alone.take("cell_entries");
-            cells.start.windows(2).for_each(|two| entries[two[0] as usize..two[1] as usize].sort_unstable());
-            assert!(entries[..cells.entries.len()] == cells.entries, "{what}: entries");
-            let mut large: Vec<u32> = alone.take("large_list");
-            large.truncate(control.large_count as usize);
-            large.sort_unstable();
-            assert!(large == cells.large, "{what}: large ones");
-            assert_eq!(control.pair_count as usize, found.pairs.len(), "{what}");
-            let keys: Vec<[u32; 2]> = alone.take("pair_keys");
-            assert!(keys[..found.pairs.len()] == found.pairs, "{what}: pairs");
-            assert!(keys[found.pairs.len()..].iter().all(|key| *key == [GARBAGE; 2]), "{what}");
-            assert_eq!([control.stop, control.overflow, control.needed], [0; 3], "{what}");
-        }
-    }
-}
-
-#[test]
-fn too_many_pairs_or_candidates_stop_the_step() {
-    let raised = |c: &Control| [c.stop, c.overflow, c.needed, c.pair_count];
-    let crowd = crowds().swap_remove(6).1;
-    let mut step = step_of(crowd.len() as u32);
-    let chosen = grid::choose(&crowd, &step);
-    let pairs = grid::find_pairs(&chosen, &grid::fill(&chosen, &crowd, &step), &crowd).pairs.len() as u32;
-    // All in one cell, or all outside of every cell, and of one body, so that the CPU need not look at 2.5e9 pairs.
-    let crowded = vec![boxed(Vec3::ZERO, Vec3::splat(0.5), 0); limits::CELL_LOOP_LIMIT as usize + 1];
-    let mut endless = vec![boxed(Vec3::ZERO, Vec3::splat(0.5), 0); limits::LARGE_LOOP_LIMIT as usize + 1];
-    endless.iter_mut().for_each(|aabb| (aabb.min, aabb.max, aabb.class) = ([-FAR; 3], [FAR; 3], size_class(FAR)));
-    for permute in PERMUTATIONS {
-        let mut alone = Alone::new(permute);
-        step.pair_capacity = pairs - 1;
-        let control = run_grid(&mut alone, &crowd, &step, &Control::zeroed());
-        assert_eq!(raised(&control), [1, overflow::PAIRS, pairs, 0]);
-        assert!(alone.take::<u32>("pair_keys").iter().all(|&key| key == GARBAGE), "nothing is written");
-        // A step after one that stopped changes nothing of what that one said.
-        let before = Control { stop: 1, overflow: overflow::LAST_BATCH, needed: 77, ..Control::zeroed() };
-        assert_eq!(raised(&run_grid(&mut alone, &crowd, &step, &before)), [1, overflow::LAST_BATCH, 77, 0]);
-        for many in [&crowded, &endless] {
-            let step = StepParams { pair_capacity: 10, ..step_of(many.len() as u32) };
-            let control = run_grid(&mut alone, many, &step, &Control::zeroed());
-            assert_eq!(raised(&control), [1, overflow::CELL, many.len() as u32, 0]);
-        }
-    }
-    let step = StepParams { pair_capacity: 10, ..step_of(limits::LARGE_LOOP_LIMIT) };
-    let control = run_grid(&mut Alone::new(0), &endless[1..], &step, &Control::zeroed());
-    assert_eq!(raised(&control), [0; 4], "as many as may be");
 }

@@ -1,74 +1,99 @@
 // Stage broadphase/grid: uniform grid by counting sort. Twin of crates/cpu/src/broadphase/grid.rs.
 //
-//   choose      one workgroup, four size classes an invocation: cell size and table bits, to counters. Reads
-//               class_histogram.
-//   clear       one thread a cell: cell_start, cell_cursor = 0.
-//   count       one thread a collider: colliders a cell to cell_start, the others to large_list. Reads aabbs.
-//   (primitives/scan of cell_start)
-//   scatter     one thread a collider: cell_entries, in no order within a cell.
-//   pair_count  one thread a collider: how many pairs it owns, to partner_offset. In the grid it owns those with higher
-//               ones of the 27 cells around and with every large one; a large one those with higher large ones.
-//   (primitives/scan of partner_offset, total to PAIR_COUNT)
-//   gate        one invocation: raises the stop flag when a bound was passed; no pairs then.
-//   pair_fill   one thread a collider: its pairs, lower collider first, to pair_keys.
-//   (primitives/sort of pair_keys)
+//   choose        one workgroup, four size classes an invocation: cell size and table bits, to counters. Reads
+//                 class_histogram.
+//   clear         one thread a cell: cells = 0; one a slice: slice_bounds empty.
+//   (where the grid is to lie in slices:
+//   bound_slices  one thread a collider: rows and columns that its slice has, to slice_bounds.
+//   size_slices   one thread a slice: its cells, to slice_start and in sum to counters.
+//   primitives/scan of slice_start)
+//   count         one thread a collider: colliders a cell to cells, the others to large_list, or to large_tree's care.
+//   (primitives/scan of cells)
+//   scatter       one thread a collider: its box to cell_boxes, in no order within a cell; cells then has the ends.
+//   pairs         one thread an entry of cell_boxes: the pairs with those behind it in its cell and those of half of the
+//                 cells around, and with large_list. Reads aabbs; writes pair_keys.
 //
-// After Le Grand, "Broad-Phase Collision Detection with CUDA" (GPU Gems 3, 2007) and Harada (GDC 2009): a collider goes
-// into the one cell that holds the middle of its box; a cell is wider than any box in it. The smallest size class is
-// taken that leaves no more than `large_limit` colliders out. The table wraps: cell (x, y, z) lies at the low bits of
-// its coordinates, at least two bits an axis, so that the 27 neighbours never fold onto each other; what folds from
-// afar is thrown out by the boxes.
+// After Le Grand, "Broad-Phase Collision Detection with CUDA" (GPU Gems 3, 2007), Harada (GDC 2009), and for the slices
+// Harada et al., "Sliced Data Structure for Particle-Based Simulations on GPUs" (GRAPHITE 2007). A collider goes into the
+// one cell that holds the middle of its box; a cell is wider than any box in it. The smallest size class is taken that
+// leaves no more than `large_limit` colliders out. The table wraps: cell (x, y, z) lies at the low bits of its
+// coordinates, at least two bits an axis, so that the 27 neighbours never fold onto each other; what folds from afar is
+// thrown out by the boxes. Or it is cut across the longest axis into slices, each with the cells of its own bounds; where
+// these would need more cells than the table has, it wraps.
 
-//#import shared/aabb.wgsl
-//#import shared/control.wgsl
-//#import shared/step.wgsl
+//#import shared/pairs.wgsl
 //#import shared/thread.wgsl
 //#import shared/workgroup.wgsl
 
-// Most candidates around one collider, and most large colliders: together one invocation's turns.
-const CELL_LOOP_LIMIT: u32 = 50000u;
-const LARGE_LOOP_LIMIT: u32 = 8192u;
+// Most slices: their sizes are added up in two words.
+const SLICE_LIMIT: u32 = 65536u;
+// Words of counters: the sums of the upper and the lower part of the slices' sizes.
+const SLICE_UPPER: u32 = 109u;
+const SLICE_LOWER: u32 = 110u;
+const LOWER_BITS: u32 = 12u;
 
-@group(0) @binding(0) var<uniform> step: StepParams;
-@group(0) @binding(1) var<uniform> control: Control;
-@group(0) @binding(2) var<storage, read_write> counters: array<atomic<u32>>;
-@group(0) @binding(3) var<storage, read> class_histogram: array<u32>;
-@group(0) @binding(4) var<storage, read> aabbs: array<Aabb>;
-@group(0) @binding(5) var<storage, read_write> cell_start: array<atomic<u32>>;
-@group(0) @binding(6) var<storage, read_write> cell_cursor: array<atomic<u32>>;
-@group(0) @binding(7) var<storage, read_write> cell_entries: array<u32>;
-@group(0) @binding(8) var<storage, read_write> large_list: array<u32>;
-@group(0) @binding(9) var<storage, read_write> partner_offset: array<u32>;
-@group(0) @binding(10) var<storage, read_write> pair_keys: array<u32>;
+// Flags of CONTROL_CELL_BITS beside the bits: the slices' axis from bit 24 on, and whether there are slices.
+const SLICED: u32 = 0x04000000u;
+
+@group(0) @binding(5) var<storage, read> class_histogram: array<u32>;
+@group(0) @binding(6) var<storage, read_write> cells: array<atomic<u32>>;
+@group(0) @binding(7) var<storage, read_write> cell_boxes: array<Aabb>;
+@group(0) @binding(8) var<storage, read_write> slice_bounds: array<atomic<i32>>;
+@group(0) @binding(9) var<storage, read_write> slice_start: array<u32>;
+@group(0) @binding(10) var<uniform> grid_options: GridOptions;
+
+struct GridOptions {
+    slices: u32, // room for slices; 0 where the grid wraps
+    large_tree: u32, // 1 where colliders larger than a cell go into a tree
+    unused_a: u32,
+    unused_b: u32,
+}
 
 // How the grid lies in one step.
 struct Grid {
     cell_class: u32, // colliders of a higher size class are large
     inverse_cell: f32, // 1/m
-    bits: vec3<u32>, // of the table's index along each axis
+    bits: vec3<u32>, // of the table's index along each axis, where it wraps
+    sliced: bool,
+    axis: u32, // of the slices
+    first: i32, // coordinate of the first slice
+    slices: u32,
 }
 
-fn unpack(cell_class: u32, inverse_cell: u32, bits: u32) -> Grid {
-    return Grid(cell_class, bitcast<f32>(inverse_cell), (vec3<u32>(bits) >> vec3<u32>(0u, 8u, 16u)) & vec3<u32>(255u));
-}
-
-// For passes that bind `control`.
-fn decided() -> Grid {
-    return unpack(control.cell_class, control.inverse_cell, control.cell_bits);
-}
-
-// For passes that bind `counters`.
-fn decided_in_counters() -> Grid {
-    return unpack(
-        atomicLoad(&counters[CONTROL_CELL_CLASS]),
-        atomicLoad(&counters[CONTROL_INVERSE_CELL]),
-        atomicLoad(&counters[CONTROL_CELL_BITS]),
+fn loaded_center(word: u32) -> vec3<f32> {
+    return vec3<f32>(
+        from_ordered(atomicLoad(&counters[word])),
+        from_ordered(atomicLoad(&counters[word + 1u])),
+        from_ordered(atomicLoad(&counters[word + 2u])),
     );
+}
+
+fn decided() -> Grid {
+    let bits = atomicLoad(&counters[CONTROL_CELL_BITS]);
+    var grid: Grid;
+    grid.cell_class = atomicLoad(&counters[CONTROL_CELL_CLASS]);
+    grid.inverse_cell = bitcast<f32>(atomicLoad(&counters[CONTROL_INVERSE_CELL]));
+    grid.bits = (vec3<u32>(bits) >> vec3<u32>(0u, 8u, 16u)) & vec3<u32>(255u);
+    if (bits & SLICED) != 0u {
+        grid.axis = (bits >> 24u) & 3u;
+        grid.first = coordinates(loaded_center(CONTROL_CENTER_MIN), grid.inverse_cell)[grid.axis];
+        let last = coordinates(loaded_center(CONTROL_CENTER_MAX), grid.inverse_cell)[grid.axis];
+        grid.slices = u32(last - grid.first) + 1u;
+        // Whether all their cells fit the table.
+        let lower = atomicLoad(&counters[SLICE_LOWER]);
+        let upper = atomicLoad(&counters[SLICE_UPPER]) + (lower >> LOWER_BITS);
+        let room = 1u << step.cell_table_bits;
+        let rest = lower & ((1u << LOWER_BITS) - 1u);
+        let room_upper = room >> LOWER_BITS;
+        let room_rest = room & ((1u << LOWER_BITS) - 1u);
+        grid.sliced = upper < room_upper || (upper == room_upper && rest <= room_rest);
+    }
+    return grid;
 }
 
 // Whether the collider goes into the grid.
 fn holds(grid: Grid, aabb: Aabb) -> bool {
-    return (aabb.body & AABB_LIVE) != 0u && aabb.size_class <= grid.cell_class;
+    return bounded(aabb) && aabb.size_class <= grid.cell_class;
 }
 
 // Cell coordinate along one axis: one multiplication. Cells are 1/16 wider than their class, which outweighs its
@@ -85,10 +110,57 @@ fn coordinates(middle: vec3<f32>, inverse_cell: f32) -> vec3<i32> {
     );
 }
 
-// Place in the table.
-fn index_of(grid: Grid, cell: vec3<i32>) -> u32 {
+fn cell_of(grid: Grid, aabb: Aabb) -> vec3<i32> {
+    return coordinates(center(aabb), grid.inverse_cell);
+}
+
+// Place in the wrapped table.
+fn wrapped(grid: Grid, cell: vec3<i32>) -> u32 {
     let low = vec3<u32>(cell) & ((vec3<u32>(1u) << grid.bits) - vec3<u32>(1u));
     return low.x | (low.y << grid.bits.x) | (low.z << (grid.bits.x + grid.bits.y));
+}
+
+// A cell's coordinates as slice, row, place in the row.
+fn turned(grid: Grid, cell: vec3<i32>) -> vec3<i32> {
+    return vec3<i32>(cell[grid.axis], cell[(grid.axis + 1u) % 3u], cell[(grid.axis + 2u) % 3u]);
+}
+
+// Lowest row and column of a slice, highest row and column; below the lowest when it is empty.
+fn bounds_of_slice(slice: u32) -> vec4<i32> {
+    return vec4<i32>(
+        atomicLoad(&slice_bounds[4u * slice]),
+        atomicLoad(&slice_bounds[4u * slice + 1u]),
+        atomicLoad(&slice_bounds[4u * slice + 2u]),
+        atomicLoad(&slice_bounds[4u * slice + 3u]),
+    );
+}
+
+// Place in the table of a cell that is in it.
+fn index_of(grid: Grid, cell: vec3<i32>) -> u32 {
+    if !grid.sliced {
+        return wrapped(grid, cell);
+    }
+    let place = turned(grid, cell);
+    let slice = u32(place.x - grid.first);
+    let bounds = bounds_of_slice(slice);
+    let columns = u32(bounds.w - bounds.y) + 1u;
+    return slice_start[slice] + u32(place.y - bounds.x) * columns + u32(place.z - bounds.y);
+}
+
+// Places (from, to) of the cells from column - 1 to column + 1 of a row that its slice may or may not have.
+fn row_of_slice(grid: Grid, s: i32, row: i32, column: i32) -> vec2<u32> {
+    let slice = u32(s - grid.first);
+    if slice >= grid.slices {
+        return vec2<u32>(0u);
+    }
+    let bounds = bounds_of_slice(slice);
+    let low = max(column - 1, bounds.y);
+    let high = min(column + 1, bounds.w);
+    if row < bounds.x || row > bounds.z || low > high {
+        return vec2<u32>(0u);
+    }
+    let first = slice_start[slice] + u32(row - bounds.x) * (u32(bounds.w - bounds.y) + 1u);
+    return vec2<u32>(first + u32(low - bounds.y), first + u32(high - bounds.y) + 1u);
 }
 
 // 1 / (17/16 of the class's upper edge): a table for the mantissa, a power of two for the exponent.
@@ -117,12 +189,15 @@ fn split_bits(cells: vec3<u32>, table_bits: u32) -> vec3<u32> {
     return bits;
 }
 
-fn loaded_center(word: u32) -> vec3<f32> {
-    return vec3<f32>(
-        from_ordered(atomicLoad(&counters[word])),
-        from_ordered(atomicLoad(&counters[word + 1u])),
-        from_ordered(atomicLoad(&counters[word + 2u])),
-    );
+// The slices' axis, the longest one, and the flag that there are any; 0 where there are too many.
+fn slices_along(extent: vec3<u32>) -> u32 {
+    var axis = 2u;
+    if extent.x >= extent.y && extent.x >= extent.z {
+        axis = 0u;
+    } else if extent.y >= extent.z {
+        axis = 1u;
+    }
+    return select(0u, SLICED | (axis << 24u), extent[axis] < grid_options.slices);
 }
 
 var<workgroup> chosen: u32;
@@ -148,16 +223,18 @@ fn choose(@builtin(local_invocation_index) lid: u32) {
     if local == 0u {
         let cell_class = chosen;
         let inverse_cell = inverse_cell_of(cell_class);
-        var cells = vec3<u32>(0u);
+        var extent = vec3<u32>(0u);
+        var flags = 0u;
         if cell_class != 0u {
             let lowest = coordinates(loaded_center(CONTROL_CENTER_MIN), inverse_cell);
             let highest = coordinates(loaded_center(CONTROL_CENTER_MAX), inverse_cell);
-            cells = vec3<u32>(highest - lowest) + vec3<u32>(1u);
+            extent = vec3<u32>(highest - lowest) + vec3<u32>(1u);
+            flags = slices_along(extent - vec3<u32>(1u));
         }
-        let bits = split_bits(cells, step.cell_table_bits);
+        let bits = split_bits(extent, step.cell_table_bits);
         atomicStore(&counters[CONTROL_CELL_CLASS], cell_class);
         atomicStore(&counters[CONTROL_INVERSE_CELL], bitcast<u32>(inverse_cell));
-        atomicStore(&counters[CONTROL_CELL_BITS], bits.x | (bits.y << 8u) | (bits.z << 16u));
+        atomicStore(&counters[CONTROL_CELL_BITS], bits.x | (bits.y << 8u) | (bits.z << 16u) | flags);
     }
 }
 
@@ -169,9 +246,57 @@ fn clear(
 ) {
     let i = invocation(wg, num, lid);
     if i <= (1u << step.cell_table_bits) {
-        atomicStore(&cell_start[i], 0u);
-        atomicStore(&cell_cursor[i], 0u);
+        atomicStore(&cells[i], 0u);
     }
+    if i < grid_options.slices {
+        slice_start[i] = 0u;
+        for (var k = 0u; k < 4u; k++) {
+            atomicStore(&slice_bounds[4u * i + k], select(-0x7fffffff, 0x7fffffff, k < 2u));
+        }
+    }
+}
+
+@compute @workgroup_size(256)
+fn bound_slices(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    let grid = decided();
+    if i >= step.collider_count || grid.slices == 0u || !holds(grid, aabbs[i]) {
+        return;
+    }
+    let place = turned(grid, cell_of(grid, aabbs[i]));
+    let slice = 4u * u32(place.x - grid.first);
+    atomicMin(&slice_bounds[slice], place.y);
+    atomicMin(&slice_bounds[slice + 1u], place.z);
+    atomicMax(&slice_bounds[slice + 2u], place.y);
+    atomicMax(&slice_bounds[slice + 3u], place.z);
+}
+
+@compute @workgroup_size(256)
+fn size_slices(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let slice = invocation(wg, num, lid);
+    if slice >= grid_options.slices {
+        return;
+    }
+    let bounds = bounds_of_slice(slice);
+    if bounds.z < bounds.x {
+        return;
+    }
+    let room = 1u << step.cell_table_bits;
+    let rows = u32(bounds.z - bounds.x) + 1u;
+    let columns = u32(bounds.w - bounds.y) + 1u;
+    // As many as there is room for, and one more where there is not enough.
+    let size = select(min(rows * columns, room + 1u), room + 1u, rows > room || columns > (room + 1u) / rows + 1u);
+    slice_start[slice] = size;
+    atomicAdd(&counters[SLICE_UPPER], size >> LOWER_BITS);
+    atomicAdd(&counters[SLICE_LOWER], size & ((1u << LOWER_BITS) - 1u));
 }
 
 @compute @workgroup_size(256)
@@ -185,10 +310,10 @@ fn count(
         return;
     }
     let aabb = aabbs[i];
-    let grid = decided_in_counters();
+    let grid = decided();
     if holds(grid, aabb) {
-        atomicAdd(&cell_start[index_of(grid, coordinates(center(aabb), grid.inverse_cell))], 1u);
-    } else if (aabb.body & AABB_LIVE) != 0u {
+        atomicAdd(&cells[index_of(grid, cell_of(grid, aabb))], 1u);
+    } else if bounded(aabb) && grid_options.large_tree == 0u {
         large_list[atomicAdd(&counters[CONTROL_LARGE_COUNT], 1u)] = i;
     }
 }
@@ -203,124 +328,105 @@ fn scatter(
     if i >= step.collider_count {
         return;
     }
-    let aabb = aabbs[i];
+    var aabb = aabbs[i];
     let grid = decided();
     if holds(grid, aabb) {
-        let cell = index_of(grid, coordinates(center(aabb), grid.inverse_cell));
-        cell_entries[atomicLoad(&cell_start[cell]) + atomicAdd(&cell_cursor[cell], 1u)] = i;
+        let place = atomicAdd(&cells[index_of(grid, cell_of(grid, aabb))], 1u);
+        aabb.size_class = i;
+        cell_boxes[place] = aabb;
     }
 }
 
-struct Partners {
-    count: u32, // pairs that the collider owns
-    candidates: u32, // colliders in the cells around it
+// First entry of a cell, once all are scattered.
+fn start_of(cell: u32) -> u32 {
+    if cell == 0u {
+        return 0u;
+    }
+    return atomicLoad(&cells[cell - 1u]);
 }
 
-// The pairs that collider i owns, counted; with `fill` also written, from `first` on. Turns: 27, and the two limits.
-fn partners(i: u32, grid: Grid, large_count: u32, first: u32, fill: bool) -> Partners {
-    let own = aabbs[i];
-    var found = Partners(0u, 0u);
-    if (own.body & AABB_LIVE) == 0u {
-        return found;
-    }
-    let held = holds(grid, own);
-    for (var k = 0u; k < min(large_count, LARGE_LOOP_LIMIT); k++) {
-        let j = large_list[k];
-        if (held || j > i) && meets(own, aabbs[j]) {
-            if fill {
-                write_pair(first + found.count, i, j);
-            }
-            found.count += 1u;
-        }
-    }
-    if !held {
-        return found;
-    }
-    let middle = coordinates(center(own), grid.inverse_cell);
-    for (var neighbour = 0; neighbour < 27; neighbour++) {
-        let way = vec3<i32>(neighbour % 3 - 1, neighbour / 3 % 3 - 1, neighbour / 9 - 1);
-        let cell = index_of(grid, middle + way);
-        let start = atomicLoad(&cell_start[cell]);
-        let here = atomicLoad(&cell_start[cell + 1u]) - start;
-        found.candidates += here;
-        if found.candidates > CELL_LOOP_LIMIT {
-            continue; // counted only: the step will stop
-        }
-        for (var k = 0u; k < here; k++) {
-            let j = cell_entries[start + k];
-            if j > i && meets(own, aabbs[j]) {
-                if fill {
-                    write_pair(first + found.count, i, j);
-                }
-                found.count += 1u;
+// Pairs of an entry with those of `first` to `last`, unless there are too many; returns how many there were.
+fn look(own: Aabb, first: u32, last: u32, before: u32) -> u32 {
+    let turns = last - first;
+    if before + turns <= TURN_LIMIT {
+        for (var k = first; k < last; k++) {
+            if meets(own, cell_boxes[k]) {
+                keep_pair(own.size_class, cell_boxes[k].size_class);
             }
         }
     }
-    return found;
+    return before + turns;
 }
 
-fn write_pair(place: u32, i: u32, j: u32) {
-    if place < step.pair_capacity {
-        pair_keys[2u * place] = min(i, j);
-        pair_keys[2u * place + 1u] = max(i, j);
+fn look_at_cells(own: Aabb, from_cell: u32, to_cell: u32, before: u32) -> u32 {
+    if from_cell >= to_cell {
+        return before;
     }
+    return look(own, start_of(from_cell), start_of(to_cell), before);
+}
+
+// The pairs of entry k with those behind it in its cell and those of half of the cells around: what lies behind it in its
+// own row, and the four rows after that, three cells of each. Returns how many there were to look at.
+fn partners(grid: Grid, k: u32) -> u32 {
+    let own = cell_boxes[k];
+    let cell = cell_of(grid, own);
+    let index = index_of(grid, cell);
+    var turns = look(own, k + 1u, start_of(index + 1u), 0u);
+    if grid.sliced {
+        let place = turned(grid, cell);
+        turns = look_at_cells(own, index + 1u, row_of_slice(grid, place.x, place.y, place.z).y, turns);
+        for (var r = 0; r < 4; r++) {
+            let way = row(r);
+            turns = look_row(own, row_of_slice(grid, place.x + way.x, place.y + way.y, place.z), turns);
+        }
+        return turns;
+    }
+    let next = wrapped(grid, cell + vec3<i32>(1, 0, 0));
+    turns = look_at_cells(own, next, next + 1u, turns);
+    for (var r = 0; r < 4; r++) {
+        let way = row(r);
+        let middle = cell + vec3<i32>(0, way.y, way.x);
+        let a = wrapped(grid, middle - vec3<i32>(1, 0, 0));
+        let b = wrapped(grid, middle);
+        let c = wrapped(grid, middle + vec3<i32>(1, 0, 0));
+        if a + 2u == c {
+            turns = look_at_cells(own, a, c + 1u, turns);
+        } else {
+            // The row's end is its beginning.
+            turns = look_at_cells(own, a, a + 1u, turns);
+            turns = look_at_cells(own, b, b + 1u, turns);
+            turns = look_at_cells(own, c, c + 1u, turns);
+        }
+    }
+    return turns;
+}
+
+fn look_row(own: Aabb, places: vec2<u32>, before: u32) -> u32 {
+    return look_at_cells(own, places.x, places.y, before);
+}
+
+// Slice and row of the four rows ahead: (0, 1), (1, -1), (1, 0), (1, 1).
+fn row(r: i32) -> vec2<i32> {
+    return vec2<i32>(min(r, 1), select(r - 2, 1, r == 0));
 }
 
 @compute @workgroup_size(256)
-fn pair_count(
+fn pairs(
     @builtin(workgroup_id) wg: vec3<u32>,
     @builtin(num_workgroups) num: vec3<u32>,
     @builtin(local_invocation_index) lid: u32,
 ) {
-    let i = invocation(wg, num, lid);
-    if i >= step.collider_count {
-        return;
-    }
-    var found = Partners(0u, 0u);
+    let k = invocation(wg, num, lid);
+    var turns = 0u;
     if atomicLoad(&counters[CONTROL_STOP]) == 0u {
-        found = partners(i, decided_in_counters(), atomicLoad(&counters[CONTROL_LARGE_COUNT]), 0u, false);
-        if found.candidates > CELL_LOOP_LIMIT {
-            atomicMax(&counters[CONTROL_OVERFLOW], OVERFLOW_TURNS);
-            atomicMax(&counters[CONTROL_NEEDED], found.candidates);
+        let grid = decided();
+        within_list(k);
+        // The last cell that is scattered ends where the entries end.
+        if k < atomicLoad(&cells[(1u << step.cell_table_bits) - 1u]) {
+            let i = cell_boxes[k].size_class;
+            with_list(i, cell_boxes[k]);
+            turns = partners(grid, k);
         }
     }
-    partner_offset[i] = found.count;
-}
-
-@compute @workgroup_size(256)
-fn gate(@builtin(local_invocation_index) lid: u32) {
-    if local_index(lid) != 0u {
-        return;
-    }
-    if atomicLoad(&counters[CONTROL_STOP]) == 0u {
-        let pairs = atomicLoad(&counters[CONTROL_PAIR_COUNT]);
-        let large = atomicLoad(&counters[CONTROL_LARGE_COUNT]);
-        if large > LARGE_LOOP_LIMIT {
-            atomicMax(&counters[CONTROL_OVERFLOW], OVERFLOW_TURNS);
-            atomicMax(&counters[CONTROL_NEEDED], large);
-        }
-        if atomicLoad(&counters[CONTROL_OVERFLOW]) != OVERFLOW_NONE {
-            atomicStore(&counters[CONTROL_STOP], 1u);
-        } else if pairs > step.pair_capacity {
-            atomicStore(&counters[CONTROL_STOP], 1u);
-            atomicStore(&counters[CONTROL_OVERFLOW], OVERFLOW_PAIRS);
-            atomicStore(&counters[CONTROL_NEEDED], pairs);
-        }
-    }
-    if atomicLoad(&counters[CONTROL_STOP]) != 0u {
-        atomicStore(&counters[CONTROL_PAIR_COUNT], 0u);
-    }
-}
-
-@compute @workgroup_size(256)
-fn pair_fill(
-    @builtin(workgroup_id) wg: vec3<u32>,
-    @builtin(num_workgroups) num: vec3<u32>,
-    @builtin(local_invocation_index) lid: u32,
-) {
-    let i = invocation(wg, num, lid);
-    if i >= step.collider_count || control.pair_count == 0u {
-        return;
-    }
-    _ = partners(i, decided(), control.large_count, partner_offset[i], true);
+    end_search(local_index(lid), turns);
 }

@@ -2,11 +2,12 @@
 // crates/cpu/src/query/mod.rs.
 //
 //   bounds  one thread a collider. Reads colliders, states; writes query_shapes (of no shape where there is none) and
-//           query_aabbs, tight but for rounding; lists those without end in query_unbounded, in no order, and counts
-//           them and the others in query_status, per workgroup, then once.
+//           query_aabbs, tight but for rounding; the range of the boxes' middles to counters, per workgroup, then once;
+//           lists those without end in query_unbounded, in no order, and counts them in query_status.
 
 //#import shared/aabb.wgsl
 //#import shared/body.wgsl
+//#import shared/control.wgsl
 //#import shared/math.wgsl
 //#import shared/query.wgsl
 //#import shared/thread.wgsl
@@ -21,8 +22,10 @@ const ROUNDING: f32 = 1e-6;
 @group(0) @binding(4) var<storage, read_write> query_aabbs: array<Aabb>;
 @group(0) @binding(5) var<storage, read_write> query_unbounded: array<u32>;
 @group(0) @binding(6) var<storage, read_write> query_status: array<atomic<u32>>;
+@group(0) @binding(7) var<storage, read_write> counters: array<atomic<u32>>;
 
-var<workgroup> leaves: atomic<u32>;
+var<workgroup> low: array<atomic<u32>, 3>; // complements, so that zero is where a minimum begins
+var<workgroup> high: array<atomic<u32>, 3>;
 
 @compute @workgroup_size(256)
 fn bounds(
@@ -31,6 +34,7 @@ fn bounds(
     @builtin(local_invocation_index) lid: u32,
 ) {
     let i = invocation(wg, num, lid);
+    let local = local_index(lid);
     if i < query_info.collider_count {
         let collider = colliders[i];
         let placed = place(collider);
@@ -40,12 +44,18 @@ fn bounds(
         if placed.shape == SHAPE_HALFSPACE {
             query_unbounded[atomicAdd(&query_status[QUERY_UNBOUNDED], 1u)] = i;
         } else if placed.shape != SHAPE_NONE {
-            atomicAdd(&leaves, 1u);
+            let middle = center(aabb);
+            for (var axis = 0u; axis < 3u; axis++) {
+                let place_along = to_ordered(middle[axis]);
+                atomicMax(&low[axis], ~place_along);
+                atomicMax(&high[axis], place_along);
+            }
         }
     }
     workgroupBarrier();
-    if local_index(lid) == 0u {
-        atomicAdd(&query_status[QUERY_LEAVES], atomicLoad(&leaves));
+    if local < 3u {
+        atomicMin(&counters[CONTROL_CENTER_MIN + local], ~atomicLoad(&low[local]));
+        atomicMax(&counters[CONTROL_CENTER_MAX + local], atomicLoad(&high[local]));
     }
 }
 

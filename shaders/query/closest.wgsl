@@ -5,7 +5,7 @@
 //   ray_any  whether it meets any, to query_met
 //   point    the collider nearest to it, the lower slot where two are as near, to query_answers
 //
-// All read rays or query_points, nodes (the tree over all bounded colliders), query_shapes and query_unbounded, and tell
+// All read rays or query_points, nodes and leaf_count (the tree over all bounded colliders), query_shapes and query_unbounded, and tell
 // a walk that was cut short in query_status. A leaf answers only where its own box is met, and no nearer than that box:
 // neither the tree's form nor the order of the walk shows.
 //
@@ -41,6 +41,7 @@ const POINT: u32 = 2u;
 @group(0) @binding(6) var<storage, read_write> query_status: array<atomic<u32>>;
 @group(0) @binding(7) var<storage, read_write> query_answers: array<QueryAnswer>;
 @group(0) @binding(8) var<storage, read_write> query_met: array<u32>;
+@group(0) @binding(9) var<storage, read> leaf_count: array<u32>;
 
 // Of this invocation: the query, the best answer so far, and its key: a ray's distance, the square of a point's.
 var<private> kind: u32;
@@ -103,7 +104,7 @@ fn search(what: u32, most: f32) {
     for (var k = 0u; k < unbounded; k++) {
         offer(query_unbounded[k], 0.0);
     }
-    let turns = nearest_first(root_of(atomicLoad(&query_status[QUERY_LEAVES])));
+    let turns = nearest_first(root_of(leaf_count[0]));
     if turns > TURN_LIMIT {
         atomicMax(&query_status[QUERY_TURNS], turns);
     }

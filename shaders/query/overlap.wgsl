@@ -5,7 +5,7 @@
 //   (primitives/scan of query_offsets, total to QUERY_TOTAL)
 //   fill   their slots, in the order of the walk, to query_found from its offset on, as far as there is room
 //
-// Both read volumes, nodes (the tree over all bounded colliders), query_shapes and query_unbounded.
+// Both read volumes, nodes and leaf_count (the tree over all bounded colliders), query_shapes and query_unbounded.
 //
 // Two boxes by separating axes: Gottschalk, Lin and Manocha, "OBBTree" (SIGGRAPH 1996), with the allowance for parallel
 // edges of Ericson, "Real-Time Collision Detection" (2005), 4.4.1.
@@ -33,6 +33,7 @@ const UNBOUNDED_LIMIT: u32 = 8192u;
 @group(0) @binding(5) var<storage, read_write> query_status: array<atomic<u32>>;
 @group(0) @binding(6) var<storage, read_write> query_offsets: array<u32>;
 @group(0) @binding(7) var<storage, read_write> query_found: array<u32>;
+@group(0) @binding(8) var<storage, read> leaf_count: array<u32>;
 
 // The shape of this invocation, how many it has found, and from where on it writes them.
 var<private> volume: QueryVolume;
@@ -78,7 +79,7 @@ fn search(write: bool) -> u32 {
     for (var k = 0u; k < unbounded; k++) {
         offer(query_unbounded[k], write);
     }
-    var next = root_of(atomicLoad(&query_status[QUERY_LEAVES]));
+    var next = root_of(leaf_count[0]);
     var turns = 0u;
     while next != NO_NODE && turns <= TURN_LIMIT {
         turns += 1u;

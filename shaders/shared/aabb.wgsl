@@ -10,10 +10,14 @@ const CLASSES: u32 = 1024u;
 
 // Whether two boxes overlap and a contact between them could push anything.
 fn meets(a: Aabb, b: Aabb) -> bool {
-    let apart = any(a.min > b.max) || any(b.min > a.max);
-    let both = (a.body & b.body & AABB_LIVE) != 0u;
-    let one_moves = ((a.body | b.body) & AABB_DYNAMIC) != 0u;
-    return !apart && both && one_moves && ((a.body ^ b.body) & AABB_INDEX) != 0u;
+    return !(any(a.min > b.max) || any(b.min > a.max)) && matter(a.body, b.body);
+}
+
+// Whether a contact between colliders of these bodies could push anything.
+fn matter(a: u32, b: u32) -> bool {
+    let both = (a & b & AABB_LIVE) != 0u;
+    let one_moves = ((a | b) & AABB_DYNAMIC) != 0u;
+    return both && one_moves && ((a ^ b) & AABB_INDEX) != 0u;
 }
 
 // Four classes an octave: exponent and two leading mantissa bits, plus one.

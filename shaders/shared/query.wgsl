@@ -4,10 +4,9 @@ const NO_COLLIDER: u32 = 0xffffffffu;
 
 // Words of `query_status`.
 const QUERY_UNBOUNDED: u32 = 0u;
-const QUERY_LEAVES: u32 = 1u;
-const QUERY_TURNS: u32 = 2u;
-const QUERY_TOTAL: u32 = 3u;
-const QUERY_COUNT: u32 = 4u;
+const QUERY_TURNS: u32 = 1u;
+const QUERY_TOTAL: u32 = 2u;
+const QUERY_COUNT: u32 = 3u;
 
 struct PlacedShape {
     position: vec3<f32>,

@@ -18,7 +18,7 @@ struct TreeNode {
 }
 
 struct TreeInfo {
-    count: u32,
+    slots: u32,
     members: u32,
     words: u32,
     capacity: u32,

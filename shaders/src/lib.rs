@@ -10,7 +10,10 @@ use std::fmt;
 pub const SOURCES: &[(&str, &str)] = &[
     ("batch", include_str!("../batch.wgsl")),
     ("bounds", include_str!("../bounds.wgsl")),
+    ("broadphase/brute_force", include_str!("../broadphase/brute_force.wgsl")),
     ("broadphase/grid", include_str!("../broadphase/grid.wgsl")),
+    ("broadphase/lbvh", include_str!("../broadphase/lbvh.wgsl")),
+    ("broadphase/pairs", include_str!("../broadphase/pairs.wgsl")),
     ("contact", include_str!("../contact.wgsl")),
     ("edit", include_str!("../edit.wgsl")),
     ("motion", include_str!("../motion.wgsl")),
@@ -39,6 +42,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/math", include_str!("../shared/math.wgsl")),
     ("shared/narrowphase", include_str!("../shared/narrowphase.wgsl")),
     ("shared/pair", include_str!("../shared/pair.wgsl")),
+    ("shared/pairs", include_str!("../shared/pairs.wgsl")),
     ("shared/project", include_str!("../shared/project.wgsl")),
     ("shared/query", include_str!("../shared/query.wgsl")),
     ("shared/recycle", include_str!("../shared/recycle.wgsl")),

@@ -1,5 +1,6 @@
 //! Model only what a scene needs: which passes a scene can ever use.
 
+use crate::builder::RigidBodyType;
 use crate::layout::pair_kind;
 use crate::scene::Scene;
 use crate::shape::Shape;
@@ -13,13 +14,18 @@ pub struct Plan {
     pub pair_kinds: u32,
     /// Some collider bounces.
     pub restitution: bool,
+    /// Some ball or cuboid is on a fixed body.
+    pub fixed: bool,
 }
 
 impl Plan {
     /// What `scene` needs.
     pub fn of(scene: &Scene) -> Self {
-        let (mut balls, mut cuboids, mut halfspaces, mut restitution) = (0u32, 0u32, 0u32, false);
+        let (mut balls, mut cuboids, mut halfspaces) = (0u32, 0u32, 0u32);
+        let (mut restitution, mut fixed) = (false, false);
         for (_, _, collider) in scene.colliders.iter() {
+            let ends = !matches!(collider.builder.shape, Shape::HalfSpace { .. });
+            fixed |= ends && scene.body(collider.body).is_ok_and(|body| body.body_type == RigidBodyType::Fixed);
             match collider.builder.shape {
                 Shape::Ball { .. } => balls += 1,
                 Shape::Cuboid { .. } => cuboids += 1,
@@ -34,7 +40,7 @@ impl Plan {
         allow(cuboids > 1, pair_kind::CUBOID_CUBOID);
         allow(balls > 0 && halfspaces > 0, pair_kind::BALL_HALFSPACE);
         allow(cuboids > 0 && halfspaces > 0, pair_kind::CUBOID_HALFSPACE);
-        Self { pair_kinds, restitution }
+        Self { pair_kinds, restitution, fixed }
     }
 
     /// Adds what `other` needs; true when that was anything new.
@@ -42,6 +48,7 @@ impl Plan {
         let before = *self;
         self.pair_kinds |= other.pair_kinds;
         self.restitution |= other.restitution;
+        self.fixed |= other.fixed;
         *self != before
     }
 
@@ -58,9 +65,10 @@ impl fmt::Display for Plan {
         let kinds: Vec<_> = (1..pair_kind::COUNT).filter(|&k| self.has(k)).map(|k| NAMES[k as usize]).collect();
         write!(
             f,
-            "pairs: {}; restitution: {}",
+            "pairs: {}; restitution: {}; fixed: {}",
             if kinds.is_empty() { "none".into() } else { kinds.join(", ") },
-            self.restitution
+            self.restitution,
+            self.fixed
         )
     }
 }

@@ -1,14 +1,15 @@
 //! Stage `query`: rays, overlaps, nearest points. Host side of `shaders/query/*.wgsl`. It is no part of a step: it runs
 //! when asked, over the committed states, and a world that is never asked has none of its buffers and passes.
 
+use crate::broadphase::lbvh::{Tree, TreeOptions};
 use crate::primitives::{Count, Scan, ScanOptions};
 use crate::{Bind, BindCache, Buffers, Gpu, Pipelines, Readback, Recorder};
-use bytemuck::Pod;
+use bytemuck::{Pod, Zeroable};
 use tumble_core::layout::{
-    Aabb, PlacedShape, QueryAnswer, QueryInfo, QueryPoint, QueryRay, QueryVolume, TreeNode, query_word,
+    Aabb, Control, PlacedShape, QueryAnswer, QueryInfo, QueryPoint, QueryRay, QueryVolume, query_word, tree_members,
 };
 use tumble_core::query::{self, BATCH, Nearest, NearestQuery, OverlapShape, Overlaps, Ray, RayHit};
-use tumble_core::{Editor, Result};
+use tumble_core::{Editor, MortonBits, Result, Traversal};
 use wgpu::BufferUsages;
 
 /// Bytes of `query_status`.
@@ -18,6 +19,7 @@ const STATUS_BYTES: u64 = 4 * query_word::COUNT as u64;
 pub(crate) struct Query {
     buffers: Buffers,
     cache: BindCache,
+    tree: Tree,
     scan: Scan,
     /// Slots of colliders that there is room for.
     colliders: u32,
@@ -27,14 +29,14 @@ pub(crate) struct Query {
 
 impl Query {
     /// Room for so many slots of colliders.
-    pub(crate) fn new(gpu: &Gpu, pipelines: &mut Pipelines, colliders: u32) -> Result<Self> {
+    pub(crate) fn new(gpu: &Gpu, pipelines: &mut Pipelines, colliders: u32, bits: MortonBits) -> Result<Self> {
         let mut buffers = Buffers::new();
         let storage = BufferUsages::STORAGE;
         for (name, bytes, capacity) in [
             ("query_shapes", size_of::<PlacedShape>(), colliders),
             ("query_aabbs", size_of::<Aabb>(), colliders),
             ("query_unbounded", 4, colliders),
-            ("nodes", 2 * size_of::<TreeNode>(), colliders),
+            ("counters", size_of::<Control>(), 1),
             ("query_status", 4, query_word::COUNT),
             ("rays", size_of::<QueryRay>(), 1),
             ("volumes", size_of::<QueryVolume>(), 1),
@@ -46,10 +48,14 @@ impl Query {
         ] {
             buffers.create(gpu, name, bytes as u64, capacity.into(), storage)?;
         }
+        buffers.alias("aabbs", "query_aabbs");
         buffers.create(gpu, "query_info", size_of::<QueryInfo>() as u64, 1, BufferUsages::UNIFORM)?;
         let options = ScanOptions { capacity: BATCH as u32, count: Count::Host(0), total: Some(query_word::TOTAL) };
         let scan = Scan::new(gpu, pipelines, options)?;
-        Ok(Self { buffers, cache: BindCache::new(), scan, colliders, of_step: None })
+        let options =
+            TreeOptions { capacity: colliders, members: tree_members::ALL, bits, traversal: Traversal::Escape };
+        let tree = Tree::new(gpu, pipelines, &options)?;
+        Ok(Self { buffers, cache: BindCache::new(), tree, scan, colliders, of_step: None })
     }
 
     /// Whether it has room for exactly so many slots of colliders.
@@ -59,7 +65,7 @@ impl Query {
 
     /// Bytes of its buffers.
     pub(crate) fn bytes(&self) -> u64 {
-        self.buffers.bytes()
+        self.buffers.bytes() + self.tree.bytes()
     }
 
     fn write<T: Pod>(&self, gpu: &Gpu, name: &str, offset: u64, data: &[T]) -> Result<()> {
@@ -82,11 +88,16 @@ impl Query {
         self.of_step = None;
         self.write(gpu, "query_info", 0, &[QueryInfo { count: 0, collider_count, capacity: 0, pad_a: 0 }])?;
         self.write(gpu, "query_status", 0, &[0u32; query_word::COUNT as usize])?;
+        let empty = Control { center_min: [u32::MAX; 3], ..Control::zeroed() };
+        self.write(gpu, "counters", 0, &[empty])?;
+        self.tree.prepare(gpu, collider_count)?;
         let bounds = pipelines.pass(gpu, "query/bounds", "bounds")?;
         let mut recorder = Recorder::new(gpu, &self.buffers, &mut self.cache, None);
         let of_world = ["states", "colliders"].map(|name| world.buffer(name).map(|buffer| Bind::new(name, buffer)));
         let [states, colliders] = of_world;
         recorder.dispatch(&bounds, &[states?, colliders?], collider_count.div_ceil(256))?;
+        self.tree.record_build(&mut recorder)?;
+        self.tree.record_refit(&mut recorder)?;
         recorder.submit()?;
         self.of_step = Some(step);
         Ok(())
@@ -110,10 +121,10 @@ impl Query {
         &mut self,
         gpu: &Gpu,
         (answers, bytes): (&str, u64),
-        record: impl FnOnce(&mut Recorder, &Buffers, &Scan) -> Result<()>,
+        record: impl FnOnce(&mut Recorder, &Parts) -> Result<()>,
     ) -> Result<(Vec<u8>, [u32; query_word::COUNT as usize])> {
         let mut recorder = Recorder::new(gpu, &self.buffers, &mut self.cache, None);
-        record(&mut recorder, &self.buffers, &self.scan)?;
+        record(&mut recorder, &Parts { buffers: &self.buffers, tree: self.tree.binds(), scan: &self.scan })?;
         let mut answered = Readback::new(gpu, "query answers", bytes, 1)?;
         let mut status = Readback::new(gpu, "query status", STATUS_BYTES, 1)?;
         answered.copy(recorder.encoder(), self.buffers.buffer(answers)?, 0);
@@ -127,6 +138,13 @@ impl Query {
         query::check_bounds(status[query_word::TURNS as usize], status[query_word::UNBOUNDED as usize])?;
         Ok((answered.wait_take(gpu)?.unwrap_or_default(), status))
     }
+}
+
+/// What a batch of queries is recorded with.
+struct Parts<'a> {
+    buffers: &'a Buffers,
+    tree: [Bind<'a>; 2],
+    scan: &'a Scan,
 }
 
 /// Asks about the state that a [`Query`] shows.
@@ -171,7 +189,8 @@ impl Asker<'_> {
             self.query.upload(self.gpu, name, some, answers)?;
             let read = (answers, (some.len() * size_of::<A>()) as u64);
             let groups = (some.len() as u32).div_ceil(256);
-            let (bytes, _) = self.query.run(self.gpu, read, |recorder, _, _| recorder.dispatch(&pass, &[], groups))?;
+            let (bytes, _) =
+                self.query.run(self.gpu, read, |recorder, parts| recorder.dispatch(&pass, &parts.tree, groups))?;
             all.extend(bytemuck::pod_collect_to_vec::<u8, A>(&bytes));
         }
         Ok(all)
@@ -200,10 +219,10 @@ impl Asker<'_> {
         query.upload(gpu, "volumes", volumes, "query_offsets")?;
         query.scan.set_count(gpu, volumes.len() as u32)?;
         let read = ("query_offsets", 4 * volumes.len() as u64);
-        let (offsets, status) = query.run(gpu, read, |recorder, buffers, scan| {
-            recorder.dispatch(&count, &[], groups)?;
+        let (offsets, status) = query.run(gpu, read, |recorder, Parts { buffers, tree, scan }| {
+            recorder.dispatch(&count, tree, groups)?;
             scan.record(recorder, buffers.buffer("query_offsets")?, Some(buffers.buffer("query_status")?))?;
-            recorder.dispatch(&fill, &[], groups)
+            recorder.dispatch(&fill, tree, groups)
         })?;
         let total = u64::from(status[query_word::TOTAL as usize]);
         let had = query.buffers.capacity("query_found");
@@ -216,8 +235,8 @@ impl Asker<'_> {
         let found = if total == 0 {
             Vec::new()
         } else {
-            let again = |recorder: &mut Recorder, _: &Buffers, _: &Scan| match total > had {
-                true => recorder.dispatch(&fill, &[], groups),
+            let again = |recorder: &mut Recorder, parts: &Parts| match total > had {
+                true => recorder.dispatch(&fill, &parts.tree, groups),
                 false => Ok(()),
             };
             query.run(gpu, ("query_found", 4 * total), again)?.0

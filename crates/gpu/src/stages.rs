@@ -2,7 +2,7 @@
 
 use crate::batch::Batch;
 use crate::bounds::Bounds;
-use crate::broadphase::grid::Grid;
+use crate::broadphase::{Broadphase, Choice};
 use crate::contact::Contact;
 use crate::edit::Edit;
 use crate::motion::Motion;
@@ -10,14 +10,22 @@ use crate::narrowphase::Narrowphase;
 use crate::solver::Solver;
 use crate::store::Sizes;
 use crate::{Buffers, Gpu, Pipelines, Recorder};
+use tumble_core::edit::Stale;
 use tumble_core::layout::StepParams;
 use tumble_core::{Plan, Result};
+
+/// What decides which passes there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Built {
+    pub(crate) plan: Plan,
+    pub(crate) choice: Choice,
+}
 
 /// Every stage that the plan needs, made for arrays of these sizes.
 pub(crate) struct Stages {
     edit: Edit,
     bounds: Bounds,
-    grid: Grid,
+    pub(crate) broadphase: Broadphase,
     contact: Contact,
     narrowphase: Narrowphase,
     batch: Batch,
@@ -26,11 +34,12 @@ pub(crate) struct Stages {
 }
 
 impl Stages {
-    pub(crate) fn new(gpu: &Gpu, pipelines: &mut Pipelines, sizes: &Sizes, plan: &Plan) -> Result<Self> {
+    pub(crate) fn new(gpu: &Gpu, pipelines: &mut Pipelines, sizes: &Sizes, built: &Built) -> Result<Self> {
+        let plan = &built.plan;
         Ok(Self {
             edit: Edit::new(gpu, pipelines)?,
             bounds: Bounds::new(gpu, pipelines)?,
-            grid: Grid::new(gpu, pipelines, sizes)?,
+            broadphase: Broadphase::new(gpu, pipelines, sizes, &built.choice)?,
             contact: Contact::new(gpu, pipelines, sizes)?,
             narrowphase: Narrowphase::new(gpu, pipelines, plan)?,
             batch: Batch::new(gpu, pipelines, sizes)?,
@@ -41,12 +50,12 @@ impl Stages {
 
     /// Bytes of the stages' own scratch.
     pub(crate) fn bytes(&self) -> u64 {
-        self.grid.bytes() + self.batch.bytes()
+        self.broadphase.bytes() + self.broadphase.sort_bytes() + self.batch.bytes()
     }
 
     /// Tells stages what they must know on the host before the step is submitted.
-    pub(crate) fn prepare(&mut self, gpu: &Gpu, step: &StepParams) -> Result<()> {
-        self.grid.prepare(gpu, step)
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, step: &StepParams, stale: Stale) -> Result<()> {
+        self.broadphase.prepare(gpu, step, stale)
     }
 
     /// Records one step: the plan phase up to the second gate, then the commit phase, whose passes do nothing once the
@@ -54,7 +63,7 @@ impl Stages {
     pub(crate) fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
         self.edit.record(recorder, step)?;
         self.bounds.record(recorder, step)?;
-        self.grid.record(recorder, buffers, step)?;
+        self.broadphase.record(recorder, buffers, step)?;
         self.contact.record_match(recorder, buffers)?;
         self.narrowphase.record(recorder, self.contact.a_pair())?;
         self.batch.record(recorder, buffers, step, self.contact.a_pair())?;

@@ -6,7 +6,7 @@ use tumble_core::layout::{
     Aabb, BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Control, EditRange, EditRecord,
     FoundManifold, Impulse, Manifold, Pair, PoseRecord, SolverBody, StepParams,
 };
-use tumble_core::{PackedScene, Result, limits};
+use tumble_core::{PackedScene, Result};
 use wgpu::BufferUsages;
 
 /// Words of `counters`, for passes that take a count from there.
@@ -47,24 +47,16 @@ pub(crate) struct Sizes {
     pub(crate) pairs: u32,
 }
 
-impl Sizes {
-    /// Entries of the cell table, the end included.
-    pub(crate) fn cells(&self) -> u32 {
-        (1 << limits::cell_table_bits(self.colliders)) + 1
-    }
-}
-
 /// Which count an array follows.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Per {
     Body,
     Collider,
-    Cell,
     Pair,
 }
 
 /// Name, bytes of an element, what it follows, whether its content outlives a step.
-const ARRAYS: [(&str, usize, Per, bool); 33] = [
+const ARRAYS: [(&str, usize, Per, bool); 29] = [
     ("states", size_of::<BodyState>(), Per::Body, true),
     ("work_states", size_of::<BodyState>(), Per::Body, false),
     ("props", size_of::<BodyProps>(), Per::Body, true),
@@ -74,11 +66,7 @@ const ARRAYS: [(&str, usize, Per, bool); 33] = [
     ("claims", 4, Per::Body, false),
     ("colliders", size_of::<Collider>(), Per::Collider, true),
     ("aabbs", size_of::<Aabb>(), Per::Collider, false),
-    ("cell_entries", 4, Per::Collider, false),
     ("large_list", 4, Per::Collider, false),
-    ("partner_offset", 4, Per::Collider, false),
-    ("cell_start", 4, Per::Cell, false),
-    ("cell_cursor", 4, Per::Cell, false),
     ("pairs", size_of::<Pair>(), Per::Pair, true),
     ("next_pairs", size_of::<Pair>(), Per::Pair, false),
     ("free_slots", 4, Per::Pair, true),
@@ -109,7 +97,6 @@ fn count(per: Per, sizes: &Sizes) -> u64 {
     u64::from(match per {
         Per::Body => sizes.bodies,
         Per::Collider => sizes.colliders,
-        Per::Cell => sizes.cells(),
         Per::Pair => sizes.pairs,
     })
 }

@@ -1,8 +1,9 @@
 //! A world on the GPU: submission, the ring of statuses, growth and the edit log.
 
+use crate::broadphase::Choice;
 use crate::query::{Asker, Query};
 use crate::readback::{Readback, read_now};
-use crate::stages::Stages;
+use crate::stages::{Built, Stages};
 use crate::store::{self, Sizes};
 use crate::{BindCache, Buffers, Gpu, Pipelines, Recorder, Timer};
 use bytemuck::Zeroable;
@@ -10,7 +11,7 @@ use std::collections::VecDeque;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{BodyState, Control, LAST_BATCH, PoseRecord, StepParams, overflow};
 use tumble_core::limits::{self, Room};
-use tumble_core::{Capacities, Editor, Error, Params, Plan, Poses, Result, Scene, StageTime, StepReport, Velocities};
+use tumble_core::{Capacities, Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
 use tumble_core::{Nearest, NearestQuery, OverlapShape, Overlaps, Ray, RayHit};
 
 /// Steps in flight before `step` waits.
@@ -35,7 +36,7 @@ pub struct World {
     sizes: Sizes,
     /// Records that the buffers of edits have room for.
     edit_room: u32,
-    built: Plan,
+    built: Built,
     cache: BindCache,
     timer: Option<Timer>,
     statuses: Readback,
@@ -61,7 +62,7 @@ pub struct World {
 struct Record {
     step: StepParams,
     edits: EditBatch,
-    plan: Plan,
+    wants: Built,
 }
 
 impl World {
@@ -104,7 +105,8 @@ impl World {
         let poses: Vec<PoseRecord> =
             packed.states.iter().zip(&packed.props).map(|(s, p)| PoseRecord::of(s, p)).collect();
         gpu.queue.write_buffer(buffers.buffer("poses")?, 0, bytemuck::cast_slice(&poses));
-        let stages = Stages::new(&gpu, &mut pipelines, &sizes, &packed.plan)?;
+        let built = Built { plan: packed.plan, choice: Choice::new(&params, &editor) };
+        let stages = Stages::new(&gpu, &mut pipelines, &sizes, &built)?;
         let timer = if params.profile { Timer::new(&gpu)? } else { None };
         let control_bytes = size_of::<Control>() as u64;
         Ok(Self {
@@ -120,8 +122,8 @@ impl World {
             stage_times: Vec::new(),
             growths: Vec::new(),
             drop_pair: u32::MAX,
+            built,
             query: None,
-            built: packed.plan,
             cache: BindCache::new(),
             gpu,
             editor,
@@ -200,10 +202,11 @@ impl World {
         step.collider_count = colliders;
         step.edit_ranges = edits.ranges.len() as u32;
         step.cell_table_bits = limits::cell_table_bits(colliders);
-        step.large_limit = limits::large_limit(colliders, false);
+        let wants = Built { plan: self.editor.plan(), choice: Choice::new(&self.params, &self.editor) };
+        step.large_limit = limits::large_limit(colliders, wants.choice.large_tree);
         step.drop_pair = std::mem::replace(&mut self.drop_pair, u32::MAX);
         self.submitted += 1;
-        self.submit(Record { step, edits, plan: self.editor.plan() })
+        self.submit(Record { step, edits, wants })
     }
 
     /// Waits for all submitted steps; the last one's report.
@@ -310,7 +313,7 @@ impl World {
         let colliders = room.min(self.editor.collider_slots() as u32);
         let query = match self.query.take() {
             Some(query) if query.fits(room) => query,
-            _ => Query::new(&self.gpu, &mut self.pipelines, room)?,
+            _ => Query::new(&self.gpu, &mut self.pipelines, room, self.params.morton_bits)?,
         };
         let query = self.query.insert(query);
         let (gpu, pipelines) = (&self.gpu, &mut self.pipelines);
@@ -328,6 +331,8 @@ impl World {
         report.adapter = format!("{}, {}", self.gpu.info.name, self.gpu.info.driver_info);
         report.bodies = self.editor.scene().len() as u32;
         report.growths = self.growths.clone();
+        report.broadphase = self.built.choice.which;
+        report.broadphase_bytes = self.stages.broadphase.bytes();
         report.memory_bytes = self.buffers.bytes() + self.stages.bytes();
         report.memory_bytes += self.query.as_ref().map_or(0, Query::bytes);
         report.stages = self.stage_times.clone();
@@ -336,7 +341,9 @@ impl World {
 
     /// Records and submits one step, and its status behind it.
     fn submit(&mut self, mut record: Record) -> Result<()> {
-        if self.built.widen(&record.plan) {
+        let widened = self.built.plan.widen(&record.wants.plan);
+        if widened || self.built.choice != record.wants.choice {
+            self.built.choice = record.wants.choice;
             self.stages = Stages::new(&self.gpu, &mut self.pipelines, &self.sizes, &self.built)?;
         }
         let step = &mut record.step;
@@ -346,7 +353,7 @@ impl World {
         let known = self.batches.iter().find(|(number, _)| number + IN_FLIGHT as u32 == step.step);
         step.wide_batches = known.map_or(WIDE_BATCHES, |(_, count)| *count);
         self.upload(&record)?;
-        self.stages.prepare(&self.gpu, &record.step)?;
+        self.stages.prepare(&self.gpu, &record.step, record.edits.stale)?;
         let timer = if self.params.profile { self.timer.as_mut() } else { None };
         let mut recorder = Recorder::new(&self.gpu, &self.buffers, &mut self.cache, timer);
         self.stages.record(&mut recorder, &self.buffers, &record.step)?;
@@ -381,6 +388,7 @@ impl World {
                 continue;
             }
             if let Some(record) = self.flying.pop_front() {
+                self.stages.broadphase.walked(record.step.step, status.turns);
                 self.batches.push_back((record.step.step, wide_batches(&status)));
                 if self.batches.len() > 2 * IN_FLIGHT {
                     self.batches.pop_front();

@@ -7,14 +7,12 @@ pub const NO_COLLIDER: u32 = u32::MAX;
 pub mod query_word {
     /// Living colliders without end.
     pub const UNBOUNDED: u32 = 0;
-    /// Bounded ones, the leaves of the tree.
-    pub const LEAVES: u32 = 1;
     /// Most turns of a query that was cut short; 0 when none was.
-    pub const TURNS: u32 = 2;
+    pub const TURNS: u32 = 1;
     /// Overlaps of all queries.
-    pub const TOTAL: u32 = 3;
+    pub const TOTAL: u32 = 2;
     /// Number of words.
-    pub const COUNT: u32 = 4;
+    pub const COUNT: u32 = 3;
 }
 
 /// A collider's shape in the world, or the shape of a query. 48 bytes.

@@ -20,17 +20,17 @@ pub struct TreeNode {
     pub escape: u32,
 }
 
-/// What a tree was built of. 16 bytes.
+/// What a tree is built of, as a uniform. 16 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct TreeInfo {
-    /// Leaves.
-    pub count: u32,
+    /// Collider slots to look through.
+    pub slots: u32,
     /// Which colliders are in it, see [`tree_members`].
     pub members: u32,
     /// Words of a code, 1 or 2.
     pub words: u32,
-    /// Room for leaves.
+    /// Room for leaves, a power of two.
     pub capacity: u32,
 }
 
@@ -42,7 +42,7 @@ pub mod tree_members {
     pub const FIXED: u32 = 1;
     /// Bounded colliders larger than a cell of the grid.
     pub const LARGE: u32 = 2;
-    /// All bounded colliders.
+    /// Every bounded collider.
     pub const ALL: u32 = 3;
 }
 

@@ -355,12 +355,12 @@ fn internal_node(codes: &[u64], i: usize) -> (u32, u32, u32) {
     }
     let end = here + length * way;
     // It splits where the prefix of all ends.
-    let common = prefix(end);
+    let whole = prefix(end);
     let mut split = 0;
     stride = length;
     while stride > 1 {
         stride = (stride + 1) / 2;
-        if prefix(here + (split + stride) * way) > common {
+        if prefix(here + (split + stride) * way) > whole {
             split += stride;
         }
     }

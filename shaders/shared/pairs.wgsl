@@ -1,0 +1,90 @@
+// Where broad phases leave their pairs: in any order, since they are sorted afterwards (broadphase/pairs.wgsl). Bindings 0
+// to 4 are here.
+//
+// An invocation keeps a few pairs to itself and takes places for them at once. Past the list's end pairs are only
+// counted. Colliders on large_list, those without end above all, are tested against all others one by one.
+
+//#import shared/aabb.wgsl
+//#import shared/control.wgsl
+//#import shared/step.wgsl
+
+const TURN_LIMIT: u32 = 50000u; // turns of one invocation's search
+const UNBOUNDED_LIMIT: u32 = 8192u; // and of its walk along large_list
+const MOST_COUNTED: u32 = 0x80000000u; // the count stops before it wraps
+const KEPT: u32 = 8u;
+
+@group(0) @binding(0) var<uniform> step: StepParams;
+@group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(2) var<storage, read> aabbs: array<Aabb>;
+@group(0) @binding(3) var<storage, read_write> large_list: array<u32>;
+@group(0) @binding(4) var<storage, read_write> pair_keys: array<u32>;
+
+var<private> kept: array<vec2<u32>, KEPT>;
+var<private> kept_count: u32;
+var<workgroup> all_turns: atomic<u32>; // zero at first, like all workgroup memory
+
+// A pair, in either order.
+fn keep_pair(i: u32, j: u32) {
+    kept[kept_count] = vec2<u32>(min(i, j), max(i, j));
+    kept_count += 1u;
+    if kept_count == KEPT {
+        write_kept();
+    }
+}
+
+fn write_kept() {
+    if kept_count != 0u && atomicLoad(&counters[CONTROL_PAIR_COUNT]) < MOST_COUNTED {
+        let first = atomicAdd(&counters[CONTROL_PAIR_COUNT], kept_count);
+        for (var k = 0u; k < kept_count; k++) {
+            if first + k < step.pair_capacity {
+                pair_keys[2u * (first + k)] = kept[k].x;
+                pair_keys[2u * (first + k) + 1u] = kept[k].y;
+            }
+        }
+    }
+    kept_count = 0u;
+}
+
+fn large_count() -> u32 {
+    return min(atomicLoad(&counters[CONTROL_LARGE_COUNT]), UNBOUNDED_LIMIT);
+}
+
+// Pairs of collider i, which is not on large_list, with all that are.
+fn with_list(i: u32, own: Aabb) {
+    let count = large_count();
+    for (var k = 0u; k < count; k++) {
+        let j = large_list[k];
+        if meets(own, aabbs[j]) {
+            keep_pair(i, j);
+        }
+    }
+}
+
+// Pairs of the collider at this place of large_list, if it has so many, with those behind it.
+fn within_list(place: u32) {
+    let count = large_count();
+    if place < count {
+        let i = large_list[place];
+        let own = aabbs[i];
+        for (var k = place + 1u; k < count; k++) {
+            let j = large_list[k];
+            if meets(own, aabbs[j]) {
+                keep_pair(i, j);
+            }
+        }
+    }
+}
+
+// Ends every invocation's search, which took so many turns; all invocations of a workgroup come here.
+fn end_search(local: u32, turns: u32) {
+    write_kept();
+    if turns > TURN_LIMIT {
+        atomicMax(&counters[CONTROL_OVERFLOW], OVERFLOW_TURNS);
+        atomicMax(&counters[CONTROL_NEEDED], turns);
+    }
+    atomicAdd(&all_turns, turns);
+    workgroupBarrier();
+    if local == 0u {
+        atomicAdd(&counters[CONTROL_TURNS], atomicLoad(&all_turns));
+    }
+}

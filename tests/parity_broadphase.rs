@@ -1,0 +1,395 @@
+//! Stage `broadphase`, pass by pass: the GPU computes what the CPU does, in every order of invocations. Oracle: the
+//! mirror; for the pairs, every box against every other.
+
+#[allow(dead_code, reason = "some passes want an index")]
+#[path = "common/alone.rs"]
+mod alone;
+mod common;
+#[path = "common/crowds.rs"]
+mod crowds;
+#[path = "common/random.rs"]
+mod random;
+
+use alone::{Alone, Chain};
+use bytemuck::Zeroable;
+use crowds::{boxed, counted, crowds};
+use random::step_of;
+use tumble_core::glam::Vec3;
+use tumble_core::layout::*;
+use tumble_core::{MortonBits, Traversal, limits};
+use tumble_cpu::bounds::{FAR, size_class};
+use tumble_cpu::broadphase::grid::{self, Grid, Large};
+use tumble_cpu::broadphase::{Boxes, brute_force, lbvh};
+use tumble_gpu::primitives::{Count, Scan, ScanOptions, Sort, SortOptions};
+
+const PERMUTATIONS: [u32; 3] = [0, 1, 2];
+const GARBAGE: u32 = 0xdead_beef;
+/// Words of `Control`.
+const PAIR_COUNT: u32 = 8;
+/// Bit of `Control::cell_bits` that tells that the grid lies in slices, and the first of those of their axis.
+const SLICED: u32 = 1 << 26;
+const SLICE_AXIS: u32 = 24;
+const WALKS: [(Traversal, &str, &str); 3] = [
+    (Traversal::Escape, "pairs_by_escapes", "across_by_escapes"),
+    (Traversal::History, "pairs_by_history", "across_by_history"),
+    (Traversal::Stack, "pairs_with_stack", "across_with_stack"),
+];
+
+fn groups(count: usize) -> u32 {
+    (count as u32).div_ceil(256) + 1
+}
+
+/// Fills in what all broad phases bind.
+fn prepare(alone: &mut Alone, boxes: &Boxes, step: &StepParams, control: &Control) {
+    let mut list = boxes.unbounded.clone();
+    list.resize(boxes.aabbs.len(), GARBAGE);
+    alone.put("step", &[*step]);
+    alone.put("counters", &[counted(boxes, control)]);
+    alone.put("class_histogram", &boxes.classes);
+    alone.put("aabbs", boxes.aabbs);
+    alone.put("large_list", &list);
+    alone.put("pair_keys", &vec![[GARBAGE; 2]; step.pair_capacity as usize]);
+    alone.put("pair_values", &vec![GARBAGE; step.pair_capacity as usize]);
+}
+
+/// The gate and the sort behind every broad phase.
+fn finish(alone: &mut Alone, step: &StepParams) -> Control {
+    let bits = vec![32 - step.collider_count.leading_zeros(); 2];
+    let options = SortOptions { capacity: step.pair_capacity, count: Count::Word(PAIR_COUNT), bits };
+    let sort = Sort::new(common::gpu(), &mut alone.pipelines, options).unwrap();
+    let [keys, values, counters] =
+        ["pair_keys", "pair_values", "counters"].map(|name| alone.buffers.buffer(name).unwrap().clone());
+    alone.run(|chain| {
+        chain.pass("broadphase/pairs", "gate", 1);
+        sort.record(&mut chain.recorder, &keys, &values, Some(&counters)).unwrap();
+    });
+    alone.take("counters")[0]
+}
+
+/// The pairs are those of `expected`, and nothing is behind them.
+fn check_pairs(alone: &Alone, control: &Control, expected: &[[u32; 2]], what: &str) {
+    assert_eq!(control.pair_count as usize, expected.len(), "{what}");
+    let keys: Vec<[u32; 2]> = alone.take("pair_keys");
+    assert!(keys[..expected.len()] == *expected, "{what}: pairs");
+    assert!(keys[expected.len()..].iter().all(|key| *key == [GARBAGE; 2]), "{what}");
+    assert_eq!([control.stop, control.overflow, control.needed], [0; 3], "{what}");
+}
+
+#[test]
+fn brute_force_finds_the_same() {
+    for (name, aabbs) in crowds() {
+        let boxes = Boxes::new(&aabbs);
+        let expected = brute_force::find_pairs(&boxes, u32::MAX);
+        let mut step = step_of(aabbs.len() as u32);
+        step.pair_capacity = expected.pairs.len() as u32 + 3;
+        for permute in PERMUTATIONS {
+            let mut alone = Alone::new(permute);
+            prepare(&mut alone, &boxes, &step, &Control::zeroed());
+            let tiles = aabbs.len() * aabbs.len().div_ceil(256);
+            alone.run(|chain| chain.pass("broadphase/brute_force", "pairs", groups(tiles)));
+            let control = finish(&mut alone, &step);
+            check_pairs(&alone, &control, &expected.pairs, &format!("{name}, permuted {permute}"));
+        }
+    }
+}
+
+/// All passes of the grid, one after the other; `slices` is the room for these.
+fn run_grid(alone: &mut Alone, boxes: &Boxes, step: &StepParams, slices: u32, large_tree: bool) {
+    let cells = (1 << step.cell_table_bits) + 1;
+    let by_collider = groups(boxes.aabbs.len());
+    alone.put("cells", &vec![GARBAGE; cells]);
+    alone.put("cell_boxes", &vec![[GARBAGE; 8]; boxes.aabbs.len()]);
+    alone.put("slice_bounds", &vec![[GARBAGE; 4]; slices as usize]);
+    alone.put("slice_start", &vec![GARBAGE; slices as usize]);
+    alone.put("grid_options", &[slices, u32::from(large_tree), 0, 0]);
+    let host = |count| ScanOptions { capacity: count, count: Count::Host(count), total: None };
+    let scan_cells = Scan::new(common::gpu(), &mut alone.pipelines, host(cells as u32)).unwrap();
+    let scan_slices = Scan::new(common::gpu(), &mut alone.pipelines, host(slices)).unwrap();
+    let [table, start] = ["cells", "slice_start"].map(|name| alone.buffers.buffer(name).unwrap().clone());
+    alone.run(|chain| {
+        let stem = "broadphase/grid";
+        chain.pass(stem, "choose", 1);
+        chain.pass(stem, "clear", groups(cells));
+        if slices > 0 {
+            chain.pass(stem, "bound_slices", by_collider);
+            chain.pass(stem, "size_slices", groups(slices as usize));
+            scan_slices.record(&mut chain.recorder, &start, None).unwrap();
+        }
+        chain.pass(stem, "count", by_collider);
+        scan_cells.record(&mut chain.recorder, &table, None).unwrap();
+        chain.pass(stem, "scatter", by_collider);
+        chain.pass(stem, "pairs", by_collider);
+    });
+}
+
+/// The grid on the GPU is `expected`, with its cells.
+fn check_grid(alone: &Alone, boxes: &Boxes, expected: &Grid, step: &StepParams, what: &str) {
+    let control = alone.take::<Control>("counters")[0];
+    let [x, y, z] = expected.bits;
+    assert_eq!(control.cell_class, expected.cell_class, "{what}");
+    assert_eq!(control.inverse_cell, expected.inverse_cell.to_bits(), "{what}");
+    assert_eq!(control.cell_bits & 0xff_ffff, x | y << 8 | z << 16, "{what}");
+    if let Some(slices) = &expected.slices {
+        assert_eq!(control.cell_bits >> SLICE_AXIS, SLICED >> SLICE_AXIS | slices.axis as u32, "{what}");
+        let start: Vec<u32> = alone.take("slice_start");
+        assert!(start[..slices.bounds.len()] == slices.start[..slices.bounds.len()], "{what}: slices");
+        let bounds: Vec<[i32; 4]> = alone.take("slice_bounds");
+        for (slice, (gpu, cpu)) in
+            bounds.iter().zip(&slices.bounds).enumerate().filter(|(_, (_, b))| b.low[0] <= b.high[0])
+        {
+            assert_eq!(*gpu, [cpu.low[0], cpu.low[1], cpu.high[0], cpu.high[1]], "{what}: slice {slice}");
+        }
+    }
+    // Cells hold their ends once all are scattered.
+    let cells = grid::fill(expected, boxes, step);
+    cells.assert_well_formed(expected, boxes);
+    let ends: Vec<u32> = alone.take("cells");
+    assert!(ends[..cells.start.len() - 1] == cells.start[1..], "{what}: cells");
+    let mut entries: Vec<Aabb> = alone.take("cell_boxes");
+    entries.truncate(cells.entries.len());
+    cells.start.windows(2).for_each(|two| entries[two[0] as usize..two[1] as usize].sort_unstable_by_key(|e| e.class));
+    assert!(entries == cells.entries, "{what}: entries");
+}
+
+#[test]
+fn grids_and_their_pairs_are_the_same() {
+    let (mut sliced, mut listed) = (0, 0);
+    for (name, aabbs) in crowds() {
+        let boxes = Boxes::new(&aabbs);
+        let mut step = step_of(aabbs.len() as u32);
+        let chosen = grid::choose(&boxes, &step);
+        let expected = brute_force::find_pairs(&boxes, u32::MAX);
+        step.pair_capacity = expected.pairs.len() as u32 + 3;
+        let room = (1 << step.cell_table_bits).min(limits::SLICE_LIMIT);
+        for (grid, slices) in [(grid::slice(&chosen, &boxes, &step), room), (chosen, 0)] {
+            let cells = grid::fill(&grid, &boxes, &step);
+            let found = grid::find_pairs(&grid, &cells, &boxes, Large::List, u32::MAX);
+            assert!(found.pairs == expected.pairs, "{name}");
+            sliced += usize::from(grid.slices.is_some());
+            listed += cells.large.len();
+            for permute in PERMUTATIONS {
+                let what = format!("{name}, permuted {permute}, room for {slices} slices");
+                let mut alone = Alone::new(permute);
+                prepare(&mut alone, &boxes, &step, &Control::zeroed());
+                run_grid(&mut alone, &boxes, &step, slices, false);
+                check_grid(&alone, &boxes, &grid, &step, &what);
+                let control = finish(&mut alone, &step);
+                assert_eq!(control.large_count as usize, boxes.unbounded.len() + cells.large.len(), "{what}");
+                check_pairs(&alone, &control, &expected.pairs, &what);
+                // Which of two in one cell looks at the other depends on the order within the cell.
+                assert_eq!(control.turns, found.turns, "{what}");
+            }
+        }
+    }
+    assert!(sliced > 10 && listed > 50, "{sliced} in slices, {listed} large");
+}
+
+/// A tree on the GPU: its buffers filled, and what its passes dispatch.
+struct TreeOf {
+    count: usize,
+    words: usize,
+    members: u32,
+}
+
+impl TreeOf {
+    fn put(&self, alone: &mut Alone) {
+        let capacity = self.count.next_power_of_two().max(1);
+        let info = TreeInfo {
+            slots: self.count as u32,
+            members: self.members,
+            words: self.words as u32,
+            capacity: capacity as u32,
+        };
+        alone.put("tree", &[info]);
+        alone.put("keys", &vec![GARBAGE; self.count * self.words]);
+        alone.put("members", &vec![GARBAGE; self.count]);
+        alone.put("nodes", &vec![[GARBAGE; 8]; 2 * self.count]);
+        alone.put("ends", &vec![GARBAGE; self.count]);
+        alone.put("parents_of", &vec![GARBAGE; 2 * self.count]);
+        alone.put("pyramid", &vec![[GARBAGE; 6]; capacity]);
+        alone.put("leaf_count", &[GARBAGE]);
+    }
+
+    fn build(&self, alone: &mut Alone) {
+        let bits = if self.words == 2 { vec![32, 32] } else { vec![31] };
+        let options = SortOptions { capacity: self.count as u32, count: Count::Host(self.count as u32), bits };
+        let sort = Sort::new(common::gpu(), &mut alone.pipelines, options).unwrap();
+        let [keys, members] = ["keys", "members"].map(|name| alone.buffers.buffer(name).unwrap().clone());
+        let by_slot = groups(self.count);
+        alone.run(|chain| {
+            chain.pass("broadphase/lbvh", "codes", by_slot);
+            sort.record(&mut chain.recorder, &keys, &members, None).unwrap();
+            chain.pass("broadphase/lbvh", "hierarchy", by_slot);
+            chain.pass("broadphase/lbvh", "parents", by_slot);
+        });
+    }
+
+    fn refit(&self, alone: &mut Alone) {
+        alone.run(|chain: &mut Chain| {
+            chain.pass("broadphase/lbvh", "leaves", groups(self.count));
+            for level in [8, 16] {
+                chain.indexed("broadphase/lbvh", "pyramid_up", ("level", level), groups(self.count >> level));
+            }
+            chain.pass("broadphase/lbvh", "boxes", groups(self.count));
+        });
+    }
+}
+
+/// The tree on the GPU is `expected`, bit for bit.
+fn check_tree(alone: &Alone, expected: &lbvh::Tree, words: usize, what: &str) {
+    let count = expected.members.len();
+    assert_eq!(alone.take::<u32>("leaf_count"), [count as u32], "{what}");
+    let keys: Vec<u32> = alone.take("keys");
+    let code = |key: &[u32]| key.iter().fold(0u64, |code, word| code << 32 | u64::from(*word));
+    assert!(keys.chunks_exact(words).take(count).map(code).eq(expected.codes.iter().copied()), "{what}: codes");
+    assert!(alone.take::<u32>("members")[..count] == expected.members, "{what}: members");
+    assert!(alone.take::<u32>("ends")[..count.max(1) - 1] == expected.ends, "{what}: ends");
+    let nodes: Vec<TreeNode> = alone.take("nodes");
+    let last = (2 * count).max(1) - 1;
+    for (node, (gpu, cpu)) in nodes.iter().zip(&expected.nodes[..last.min(expected.nodes.len())]).enumerate() {
+        assert_eq!(gpu, cpu, "{what}: node {node}");
+    }
+    let parents: Vec<u32> = alone.take("parents_of");
+    for (node, (gpu, cpu)) in parents.iter().zip(&expected.parents).enumerate().filter(|(_, (_, cpu))| **cpu != NO_NODE)
+    {
+        assert_eq!(gpu, cpu, "{what}: parent of {node}");
+    }
+}
+
+#[test]
+fn trees_and_their_pairs_are_the_same() {
+    for (name, aabbs) in crowds() {
+        let boxes = Boxes::new(&aabbs);
+        let mut step = step_of(aabbs.len() as u32);
+        let expected = brute_force::find_pairs(&boxes, u32::MAX);
+        step.pair_capacity = expected.pairs.len() as u32 + 3;
+        // The same colliders elsewhere, as they were when the trees were built.
+        let before: Vec<Aabb> = aabbs.iter().map(|aabb| shifted(aabb, aabbs.len())).collect();
+        let old = Boxes::new(&before);
+        for (bits, words) in [(MortonBits::Bits30, 1), (MortonBits::Bits63, 2)] {
+            for permute in PERMUTATIONS.into_iter().filter(|permute| words == 1 || *permute == 1) {
+                let what = format!("{name}, {bits:?}, permuted {permute}");
+                let mut trees = Vec::new();
+                for members in [tree_members::MOVING, tree_members::FIXED] {
+                    let tree = TreeOf { count: aabbs.len(), words, members };
+                    let mut alone = Alone::new(permute);
+                    tree.put(&mut alone);
+                    prepare(&mut alone, &old, &step, &Control::zeroed());
+                    tree.build(&mut alone);
+                    tree.refit(&mut alone);
+                    let mut mirror = lbvh::Tree::new(&old, bits, members);
+                    mirror.link_parents();
+                    mirror.assert_well_formed(&old);
+                    check_tree(&alone, &mirror, words, &format!("{what}, members {members}"));
+                    // As they are now.
+                    alone.put("aabbs", &aabbs);
+                    tree.refit(&mut alone);
+                    mirror.refit(&boxes);
+                    mirror.assert_well_formed(&boxes);
+                    check_tree(&alone, &mirror, words, &format!("{what}, members {members}, refitted"));
+                    trees.push((alone, mirror));
+                }
+                for (traversal, pairs, across) in WALKS {
+                    let what = format!("{what}, {traversal:?}");
+                    let found = lbvh::find_pairs(&trees[0].1, &trees[1].1, &boxes, traversal, u32::MAX);
+                    assert!(found.pairs == expected.pairs, "{what}: mirror");
+                    let groups = groups(aabbs.len());
+                    let (moving, fixed) = trees.split_at_mut(1);
+                    let [(moving, _), (fixed, _)] = [&mut moving[0], &mut fixed[0]];
+                    prepare(moving, &boxes, &step, &Control::zeroed());
+                    moving.run(|chain| chain.pass("broadphase/lbvh", pairs, groups));
+                    // What the first tree found goes on in the second one's buffers.
+                    let (control, keys) = (moving.take::<Control>("counters")[0], moving.take::<u32>("pair_keys"));
+                    prepare(fixed, &boxes, &step, &Control::zeroed());
+                    fixed.put("counters", &[control]);
+                    fixed.put("pair_keys", &keys);
+                    fixed.run(|chain| chain.pass("broadphase/lbvh", across, groups));
+                    let control = finish(fixed, &step);
+                    check_pairs(fixed, &control, &expected.pairs, &what);
+                    assert_eq!(control.turns, found.turns, "{what}");
+                }
+            }
+        }
+    }
+}
+
+/// A box that ends is moved a little, each elsewhere.
+fn shifted(aabb: &Aabb, salt: usize) -> Aabb {
+    if aabb.class >= size_class(FAR) || aabb.body & aabb_body::LIVE == 0 {
+        return *aabb;
+    }
+    let by = |x: f32, i: usize| x + ((aabb.body as usize * 7 + i * 3 + salt) % 11) as f32 * 0.2;
+    let (min, max): ([f32; 3], [f32; 3]) =
+        (std::array::from_fn(|i| by(aabb.min[i], i)), std::array::from_fn(|i| by(aabb.max[i], i)));
+    let class = size_class((0..3).map(|i| max[i] - min[i]).fold(0.0, f32::max));
+    Aabb { min, body: aabb.body, max, class }
+}
+
+#[test]
+fn a_tree_of_the_large_ones_goes_with_a_grid() {
+    let mut in_trees = 0;
+    for (name, aabbs) in crowds() {
+        let boxes = Boxes::new(&aabbs);
+        let mut step = step_of(aabbs.len() as u32);
+        step.large_limit = limits::large_limit(aabbs.len() as u32, true);
+        let expected = brute_force::find_pairs(&boxes, u32::MAX);
+        step.pair_capacity = expected.pairs.len() as u32 + 3;
+        let chosen = grid::choose(&boxes, &step);
+        let cells = grid::fill(&chosen, &boxes, &step);
+        in_trees += cells.large.len();
+        for ((traversal, pairs, across), permute) in WALKS.into_iter().zip(PERMUTATIONS) {
+            let what = format!("{name}, {traversal:?}, permuted {permute}");
+            let found = grid::find_pairs(&chosen, &cells, &boxes, Large::Tree(traversal), u32::MAX);
+            assert!(found.pairs == expected.pairs, "{what}: mirror");
+            let mut alone = Alone::new(permute);
+            let tree = TreeOf { count: aabbs.len(), words: 1, members: tree_members::LARGE };
+            tree.put(&mut alone);
+            prepare(&mut alone, &boxes, &step, &Control::zeroed());
+            run_grid(&mut alone, &boxes, &step, 0, true);
+            tree.build(&mut alone);
+            tree.refit(&mut alone);
+            alone.run(|chain| {
+                chain.pass("broadphase/lbvh", pairs, groups(aabbs.len()));
+                chain.pass("broadphase/lbvh", across, groups(aabbs.len()));
+            });
+            let control = finish(&mut alone, &step);
+            check_pairs(&alone, &control, &expected.pairs, &what);
+            assert_eq!(control.turns, found.turns, "{what}");
+        }
+    }
+    assert!(in_trees > 500, "{in_trees}");
+}
+
+#[test]
+fn too_many_pairs_or_turns_stop_the_step() {
+    let raised = |c: &Control| [c.stop, c.overflow, c.needed, c.pair_count];
+    let crowd = crowds().swap_remove(7).1;
+    let boxes = Boxes::new(&crowd);
+    let mut step = step_of(crowd.len() as u32);
+    let pairs = brute_force::find_pairs(&boxes, u32::MAX).pairs.len() as u32;
+    // All in one cell, or all without end, and of one body, so that the CPU need not look at 2.5e9 pairs.
+    let crowded = vec![boxed(Vec3::ZERO, Vec3::splat(0.5), 0); limits::TURN_LIMIT as usize + 2];
+    let mut endless = vec![boxed(Vec3::ZERO, Vec3::splat(0.5), 0); limits::UNBOUNDED_LIMIT as usize + 1];
+    endless.iter_mut().for_each(|aabb| (aabb.min, aabb.max, aabb.class) = ([-FAR; 3], [FAR; 3], size_class(FAR)));
+    let run = |alone: &mut Alone, boxes: &Boxes, step: &StepParams, before: &Control| {
+        prepare(alone, boxes, step, before);
+        run_grid(alone, boxes, step, 0, false);
+        finish(alone, step)
+    };
+    for permute in PERMUTATIONS {
+        let mut alone = Alone::new(permute);
+        step.pair_capacity = pairs - 1;
+        assert_eq!(raised(&run(&mut alone, &boxes, &step, &Control::zeroed())), [1, overflow::PAIRS, pairs, 0]);
+        // A step after one that stopped changes nothing of what that one said.
+        let before = Control { stop: 1, overflow: overflow::LAST_BATCH, needed: 77, ..Control::zeroed() };
+        assert_eq!(raised(&run(&mut alone, &boxes, &step, &before)), [1, overflow::LAST_BATCH, 77, 0]);
+        for (many, bound, needed) in [(&crowded, overflow::TURNS, 50_001), (&endless, overflow::UNBOUNDED, 8193)] {
+            let step = StepParams { pair_capacity: 10, ..step_of(many.len() as u32) };
+            let control = run(&mut alone, &Boxes::new(many), &step, &Control::zeroed());
+            assert_eq!(raised(&control), [1, bound, needed, 0]);
+        }
+    }
+    let step = StepParams { pair_capacity: 10, ..step_of(limits::UNBOUNDED_LIMIT) };
+    let control = run(&mut Alone::new(0), &Boxes::new(&endless[1..]), &step, &Control::zeroed());
+    assert_eq!(raised(&control), [0; 4], "as many as may be");
+}
