@@ -18,7 +18,7 @@
 //#import shared/thread.wgsl
 //#import shared/tree.wgsl
 
-// Nodes kept for later; where there is no room for one, its subtree is walked by escapes at once.
+// Nodes kept for later, and one more; where there is no room for one, its subtree is walked by escapes at once.
 const STACK: u32 = 32u;
 
 // Most turns of one walk: with UNBOUNDED_LIMIT below what every driver allows the loops of one invocation.
@@ -142,7 +142,8 @@ fn offer(collider: u32, leaf_key: f32) {
 }
 
 // Offers the colliders of all leaves whose key is no more than best_key, nearer children first. Returns the turns that
-// it took; more than TURN_LIMIT when it was cut short.
+// it took; more than TURN_LIMIT when it was cut short. It is one loop: some drivers count a turn of a loop within it at
+// every turn, entered or not, and end both after so many.
 fn nearest_first(root: u32) -> u32 {
     if root == NO_NODE {
         return 0u;
@@ -152,40 +153,58 @@ fn nearest_first(root: u32) -> u32 {
     var depth = 0u;
     var next = root;
     var own = key_of(root);
+    // While a subtree is walked by escapes: where that ends. The node to go on from is then on top of the stack.
+    var escaping = false;
+    var end = NO_NODE;
     var turns = 0u;
     while turns <= TURN_LIMIT {
         turns += 1u;
+        let is_leaf = (next & 1u) == 0u;
         // The best may have come down since the node was kept.
-        if own <= best_key {
-            if (next & 1u) == 0u {
-                offer(nodes[next].child, own);
-            } else {
-                var near = nodes[next].child;
-                var far = nodes[near].escape;
-                var near_key = key_of(near);
-                var far_key = key_of(far);
-                if far_key < near_key {
-                    let left = near;
-                    let left_key = near_key;
-                    near = far;
-                    near_key = far_key;
-                    far = left;
-                    far_key = left_key;
-                }
-                if far_key <= best_key {
-                    if depth == STACK {
-                        turns = by_escapes(far, turns);
-                    } else {
-                        later[depth] = far;
-                        keys[depth] = far_key;
-                        depth += 1u;
-                    }
-                }
-                if near_key <= best_key {
-                    next = near;
-                    own = near_key;
-                    continue;
-                }
+        let enters = own <= best_key;
+        if enters && is_leaf {
+            offer(nodes[next].child, own);
+        }
+        if escaping {
+            next = select(nodes[next].escape, nodes[next].child, enters && !is_leaf);
+            if next != end {
+                own = key_of(next);
+                continue;
+            }
+            escaping = false;
+        } else if enters && !is_leaf {
+            var near = nodes[next].child;
+            var far = nodes[near].escape;
+            var near_key = key_of(near);
+            var far_key = key_of(far);
+            if far_key < near_key {
+                let left = near;
+                let left_key = near_key;
+                near = far;
+                near_key = far_key;
+                far = left;
+                far_key = left_key;
+            }
+            if far_key <= best_key && depth == STACK - 1u {
+                // The last place is the nearer child's.
+                later[depth] = near;
+                keys[depth] = near_key;
+                depth += 1u;
+                escaping = true;
+                end = nodes[far].escape;
+                next = far;
+                own = far_key;
+                continue;
+            }
+            if far_key <= best_key {
+                later[depth] = far;
+                keys[depth] = far_key;
+                depth += 1u;
+            }
+            if near_key <= best_key {
+                next = near;
+                own = near_key;
+                continue;
             }
         }
         if depth == 0u {
@@ -194,26 +213,6 @@ fn nearest_first(root: u32) -> u32 {
         depth -= 1u;
         next = later[depth];
         own = keys[depth];
-    }
-    return turns;
-}
-
-// The same for the subtree of `top`, from left to right; returns the turns, those before added.
-fn by_escapes(top: u32, before: u32) -> u32 {
-    let end = nodes[top].escape;
-    var next = top;
-    var turns = before;
-    while next != end && turns <= TURN_LIMIT {
-        turns += 1u;
-        let own = key_of(next);
-        if own > best_key {
-            next = nodes[next].escape;
-        } else if (next & 1u) == 0u {
-            offer(nodes[next].child, own);
-            next = nodes[next].escape;
-        } else {
-            next = nodes[next].child;
-        }
     }
     return turns;
 }

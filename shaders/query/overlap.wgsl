@@ -139,36 +139,32 @@ fn ball_overlaps_cuboid(ball: PlacedShape, cuboid: PlacedShape) -> bool {
     return dot(out, out) <= ball.size.x * ball.size.x;
 }
 
+// No loops: some drivers count a turn of each within a walk's every turn, and end the walk after so many.
 fn cuboids_overlap(a: PlacedShape, b: PlacedShape) -> bool {
     let to_a = transpose(mat3_from_quat(a.rotation));
     let between = to_a * (b.position - a.position);
-    // Axes of b in a's frame.
-    let axes_of_b = to_a * mat3_from_quat(b.rotation);
-    var axes = array<vec3<f32>, 3>(axes_of_b[0], axes_of_b[1], axes_of_b[2]);
+    // Axes of b in a's frame, and those of a in b's.
+    let axes = to_a * mat3_from_quat(b.rotation);
+    let rows = transpose(axes);
     let allowance = vec3<f32>(PARALLEL);
-    var cosines = array<vec3<f32>, 3>(abs(axes[0]) + allowance, abs(axes[1]) + allowance, abs(axes[2]) + allowance);
-    let reach = a.size + cosines[0] * b.size.x + cosines[1] * b.size.y + cosines[2] * b.size.z;
-    if any(abs(between) > reach) {
+    let x = abs(rows[0]) + allowance;
+    let y = abs(rows[1]) + allowance;
+    let z = abs(rows[2]) + allowance;
+    let along_a = vec3<f32>(dot(x, b.size), dot(y, b.size), dot(z, b.size)) + a.size;
+    let along_b = x * a.size.x + y * a.size.y + z * a.size.z + b.size;
+    if any(abs(between) > along_a) || any(abs(rows[0] * between.x + rows[1] * between.y + rows[2] * between.z) > along_b) {
         return false;
     }
-    for (var j = 0u; j < 3u; j++) {
-        if abs(dot(between, axes[j])) > dot(a.size, cosines[j]) + b.size[j] {
-            return false;
-        }
-    }
-    for (var i = 0u; i < 3u; i++) {
-        let i1 = (i + 1u) % 3u;
-        let i2 = (i + 2u) % 3u;
-        for (var j = 0u; j < 3u; j++) {
-            let j1 = (j + 1u) % 3u;
-            let j2 = (j + 2u) % 3u;
-            let reach_a = a.size[i1] * cosines[j][i2] + a.size[i2] * cosines[j][i1];
-            let reach_b = b.size[j1] * cosines[j2][i] + b.size[j2] * cosines[j1][i];
-            let apart = between[i2] * axes[j][i1] - between[i1] * axes[j][i2];
-            if abs(apart) > reach_a + reach_b {
-                return false;
-            }
-        }
-    }
-    return true;
+    // An axis of a across each of b.
+    let apart_x = abs(between.z * rows[1] - between.y * rows[2]);
+    let apart_y = abs(between.x * rows[2] - between.z * rows[0]);
+    let apart_z = abs(between.y * rows[0] - between.x * rows[1]);
+    return !any(apart_x > a.size.y * z + a.size.z * y + across(b.size, x))
+        && !any(apart_y > a.size.z * x + a.size.x * z + across(b.size, y))
+        && !any(apart_z > a.size.x * y + a.size.y * x + across(b.size, z));
+}
+
+// How far a box reaches across an axis and each of its own, from the cosines between that axis and its own.
+fn across(size: vec3<f32>, cosines: vec3<f32>) -> vec3<f32> {
+    return size.yzx * cosines.zxy + size.zxy * cosines.yzx;
 }

@@ -302,7 +302,7 @@ impl World {
         report.growths = self.growths.clone();
         report.broadphase = broadphase;
         report.broadphase_bytes = self.finder.bytes();
-        report.memory_bytes = self.kept.bytes() + self.finder.bytes();
+        report.memory_bytes = self.kept.bytes() + self.finder.bytes() + self.queries.bytes();
         report.stages = watch.stages;
         self.report = report;
     }

@@ -98,7 +98,7 @@ impl grid::Cells {
 
 impl lbvh::Tree {
     /// Bytes of all arrays.
-    fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         let leaf = 8 + 4 + 2 * size_of::<TreeNode>() + 4 + 2 * 24;
         (leaf * self.members.len() + 4 * self.parents.len()) as u64
     }

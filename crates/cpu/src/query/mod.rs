@@ -205,6 +205,12 @@ impl Cached {
         }
     }
 
+    /// Bytes of what it keeps.
+    pub(crate) fn bytes(&self) -> u64 {
+        let slots = size_of::<PlacedShape>() * self.snapshot.placed.len() + 4 * self.snapshot.unbounded.len();
+        slots as u64 + self.snapshot.tree.bytes()
+    }
+
     /// Asks all at once, in parallel; answers are in the order of the queries.
     fn ask<Q: Sync, A: Send>(&self, queries: &[Q], one: impl Fn(&Q) -> (A, u32) + Sync + Send) -> Result<Vec<A>> {
         let (answers, turns): (Vec<A>, Vec<u32>) = queries.par_iter().with_min_len(16).map(one).unzip();

@@ -151,35 +151,33 @@ fn ball_overlaps_cuboid(ball: &PlacedShape, cuboid: &PlacedShape) -> bool {
 }
 
 fn cuboids_overlap(a: &PlacedShape, b: &PlacedShape) -> bool {
-    let (rotation_a, rotation_b) = (Mat3::from_quat(quat(a.rotation)), Mat3::from_quat(quat(b.rotation)));
     let (size_a, size_b) = (vec3(a.size), vec3(b.size));
-    let to_a = rotation_a.transpose();
+    let to_a = Mat3::from_quat(quat(a.rotation)).transpose();
     let between = to_a * (vec3(b.position) - vec3(a.position));
-    // Axes of b in a's frame.
-    let axes = to_a * rotation_b;
-    let cosines =
-        Mat3::from_cols(axes.x_axis.abs() + PARALLEL, axes.y_axis.abs() + PARALLEL, axes.z_axis.abs() + PARALLEL);
-    if (between.abs() - size_a - cosines * size_b).max_element() > 0.0 {
+    // Axes of b in a's frame, and those of a in b's.
+    let axes = to_a * Mat3::from_quat(quat(b.rotation));
+    let rows = axes.transpose();
+    let [row_x, row_y, row_z] = [rows.x_axis, rows.y_axis, rows.z_axis];
+    let [x, y, z] = [row_x, row_y, row_z].map(|row| row.abs() + PARALLEL);
+    let along_a = Vec3::new(x.dot(size_b), y.dot(size_b), z.dot(size_b)) + size_a;
+    let along_b = x * size_a.x + y * size_a.y + z * size_a.z + size_b;
+    let between_in_b = row_x * between.x + row_y * between.y + row_z * between.z;
+    if between.abs().cmpgt(along_a).any() || between_in_b.abs().cmpgt(along_b).any() {
         return false;
     }
-    for j in 0..3 {
-        if between.dot(axes.col(j)).abs() > size_a.dot(cosines.col(j)) + size_b[j] {
-            return false;
-        }
-    }
-    for i in 0..3 {
-        let (i1, i2) = ((i + 1) % 3, (i + 2) % 3);
-        for j in 0..3 {
-            let (j1, j2) = ((j + 1) % 3, (j + 2) % 3);
-            let reach_a = size_a[i1] * cosines.col(j)[i2] + size_a[i2] * cosines.col(j)[i1];
-            let reach_b = size_b[j1] * cosines.col(j2)[i] + size_b[j2] * cosines.col(j1)[i];
-            let apart = between[i2] * axes.col(j)[i1] - between[i1] * axes.col(j)[i2];
-            if apart.abs() > reach_a + reach_b {
-                return false;
-            }
-        }
-    }
-    true
+    // An axis of a across each of b.
+    let apart_x = (between.z * row_y - between.y * row_z).abs();
+    let apart_y = (between.x * row_z - between.z * row_x).abs();
+    let apart_z = (between.y * row_x - between.x * row_y).abs();
+    !apart_x.cmpgt(size_a.y * z + size_a.z * y + across(size_b, x)).any()
+        && !apart_y.cmpgt(size_a.z * x + size_a.x * z + across(size_b, y)).any()
+        && !apart_z.cmpgt(size_a.x * y + size_a.y * x + across(size_b, z)).any()
+}
+
+/// How far a box reaches across an axis and each of its own, from the cosines between that axis and its own.
+fn across(size: Vec3, cosines: Vec3) -> Vec3 {
+    let turned = |v: Vec3| Vec3::new(v.y, v.z, v.x);
+    turned(size) * turned(turned(cosines)) + turned(turned(size)) * turned(cosines)
 }
 
 /// The point of a solid shape that is nearest to `point`, and the square of its distance.
