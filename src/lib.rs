@@ -33,9 +33,9 @@ pub use tumble_gpu as gpu;
 
 pub use tumble_core as core;
 pub use tumble_core::{
-    BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Editor, Error, Inserted, Nearest,
-    NearestQuery, Overlap, OverlapShape, Overlaps, Params, Pose, Poses, Ray, RayHit, Result, RigidBodyBuilder,
-    RigidBodyType, Scene, Shape, StepReport, Velocities, Velocity,
+    BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Editor, Error, Inserted,
+    MortonBits, Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Params, Pose, Poses, Ray, RayHit, Result,
+    RigidBodyBuilder, RigidBodyType, Scene, Shape, StepReport, Traversal, Velocities, Velocity,
 };
 pub use world::{Backend, World};
 

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 use tumble::core::{measures, scenes};
-use tumble::{Backend, Params, World};
+use tumble::{Backend, Broadphase, Params, World};
 
-const FIELDS: [&str; 19] = [
+const FIELDS: [&str; 21] = [
     "scene",
     "backend",
     "adapter",
@@ -24,6 +24,8 @@ const FIELDS: [&str; 19] = [
     "penetration",
     "kinetic_energy_j",
     "memory_bytes",
+    "broadphase",
+    "broadphase_bytes_per_body",
     "growths",
     "lost",
     "quarantined",
@@ -119,7 +121,7 @@ fn json_has_the_documented_fields() {
     found.sort_unstable();
     assert_eq!(found, expected);
 
-    let params = Params { dt: 0.01, substeps: 3, ..Params::default() };
+    let params = Params { dt: 0.01, substeps: 3, broadphase: Broadphase::Grid, ..Params::default() };
     let mut world = World::new(scenes::pile(50), params, Backend::Cpu).unwrap();
     for _ in 0..90 {
         world.step().unwrap();
@@ -147,6 +149,8 @@ fn json_has_the_documented_fields() {
         assert_eq!(json[field], count, "{field}");
     }
     assert!(report.contacts > 0);
+    assert_eq!(json["broadphase"], "grid");
+    assert!(json["broadphase_bytes_per_body"].as_f64().unwrap() > 10.0);
     assert_eq!((&json["scene"], &json["backend"]), (&"pile".into(), &"cpu".into()));
     assert!(json["adapter"].as_str().unwrap().contains("2 threads"));
     assert_eq!(json["dt"].as_f64().unwrap() as f32, 0.01);

@@ -383,7 +383,11 @@ fn too_many_pairs_or_turns_stop_the_step() {
         // A step after one that stopped changes nothing of what that one said.
         let before = Control { stop: 1, overflow: overflow::LAST_BATCH, needed: 77, ..Control::zeroed() };
         assert_eq!(raised(&run(&mut alone, &boxes, &step, &before)), [1, overflow::LAST_BATCH, 77, 0]);
-        for (many, bound, needed) in [(&crowded, overflow::TURNS, 50_001), (&endless, overflow::UNBOUNDED, 8193)] {
+        // The crowded cell takes 1.25e9 tests: once is enough.
+        let hard = usize::from(permute > 0);
+        for (many, bound, needed) in
+            [(&crowded, overflow::TURNS, 50_001), (&endless, overflow::UNBOUNDED, 8193)].into_iter().skip(hard)
+        {
             let step = StepParams { pair_capacity: 10, ..step_of(many.len() as u32) };
             let control = run(&mut alone, &Boxes::new(many), &step, &Control::zeroed());
             assert_eq!(raised(&control), [1, bound, needed, 0]);

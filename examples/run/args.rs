@@ -88,7 +88,11 @@ enum BackendName {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum BroadphaseName {
     Auto,
+    BruteForce,
     Grid,
+    SlicedGrid,
+    Lbvh,
+    SweepAndPrune,
 }
 
 impl Args {
@@ -100,7 +104,11 @@ impl Args {
         params.threads = self.threads.map(|n| n as usize);
         params.broadphase = match self.broadphase {
             BroadphaseName::Auto => Broadphase::Auto,
+            BroadphaseName::BruteForce => Broadphase::BruteForce,
             BroadphaseName::Grid => Broadphase::Grid,
+            BroadphaseName::SlicedGrid => Broadphase::SlicedGrid,
+            BroadphaseName::Lbvh => Broadphase::Lbvh,
+            BroadphaseName::SweepAndPrune => Broadphase::SweepAndPrune,
         };
         params.validate()?;
         Ok(params)

@@ -97,6 +97,8 @@ impl Outcome {
             "penetration": { "max_m": self.penetration.max_m, "mean_m": self.penetration.mean_m },
             "kinetic_energy_j": self.kinetic_energy,
             "memory_bytes": report.memory_bytes,
+            "broadphase": report.broadphase.to_string(),
+            "broadphase_bytes_per_body": report.broadphase_bytes_per_body(),
             "growths": growths,
             "lost": report.lost,
             "quarantined": report.quarantined,
@@ -124,6 +126,7 @@ impl Outcome {
                 row(&format!("  {stage}"), ms.map_or(NOT_MEASURED.into(), |ms| format!("{ms:.3}")));
             }
         }
+        row("broad phase", format!("{}, {:.0} bytes a body", report.broadphase, report.broadphase_bytes_per_body()));
         row("pairs", report.pairs.to_string());
         row("contacts", report.contacts.to_string());
         row("batches", report.batches.to_string());

@@ -197,7 +197,8 @@ fn slices_along(extent: vec3<u32>) -> u32 {
     } else if extent.y >= extent.z {
         axis = 1u;
     }
-    return select(0u, SLICED | (axis << 24u), extent[axis] < grid_options.slices);
+    let room = min(grid_options.slices, 1u << step.cell_table_bits);
+    return select(0u, SLICED | (axis << 24u), extent[axis] < room);
 }
 
 var<workgroup> chosen: u32;

@@ -1,8 +1,9 @@
 // Exclusive scan of u32, in place: reduce, then scan; no workgroup waits for another.
 //
 // `reduce` writes the sum of each block of 2,048 elements to `sums`, `scan_sums` scans those, `scan_blocks` scans each
-// block and adds what came before it. One workgroup a block, 8 consecutive elements an invocation; `scan_sums` is one
-// workgroup that goes through the array bound as its `data` 2,048 elements at a time, and enough for a short array.
+// block and adds what came before it. One workgroup a block; `scan_sums` is one workgroup that goes through the array
+// bound as its `data` 2,048 elements at a time, and enough for a short array. An invocation scans 8 neighbours, and
+// reads and writes elements far apart, so that invocations side by side meet in memory: workgroup memory swaps the two.
 //
 // Reads and writes `data`. The number of elements is `elements()`; the sum of all goes to a word of `counts`. After
 // Merrill and Grimshaw, "Parallel Scan for Stream Architectures" (2009).
@@ -11,7 +12,7 @@
 //#import shared/workgroup.wgsl
 
 const NO_WORD: u32 = 0xffffffffu;
-const EACH: u32 = 8u; // elements an invocation
+const EACH: u32 = 8u; // neighbours that an invocation scans
 const BLOCK: u32 = 2048u; // elements a workgroup
 
 struct ScanParams {
@@ -41,28 +42,48 @@ fn elements() -> u32 {
     return min(units, params.units) * params.times;
 }
 
-// The 8 elements of one invocation: sum of those before each, and the sum of all.
-struct Eight {
-    before: array<u32, EACH>,
-    sum: u32,
+// Rows of 8 and a gap, so that invocations side by side meet no bank conflict.
+var<workgroup> rows: array<u32, 2304>;
+
+fn slot(element: u32) -> u32 {
+    return element + element / EACH;
 }
 
-fn load(first: u32, count: u32) -> Eight {
-    var eight: Eight;
-    for (var k = 0u; k < EACH; k++) {
-        eight.before[k] = eight.sum;
-        if first + k < count {
-            eight.sum += data[first + k];
+// Fills `rows` with a block's elements, zero past the end. For all invocations at once.
+fn load(start: u32, local: u32, count: u32) {
+    for (var k = local; k < BLOCK; k += WORKGROUP) {
+        var value = 0u;
+        if start + k < count {
+            value = data[start + k];
         }
+        rows[slot(k)] = value;
     }
-    return eight;
+    workgroupBarrier();
 }
 
-fn store(first: u32, count: u32, start: u32, eight: Eight) {
-    var parts = eight;
+// Scans `rows` and returns the sum of all. For all invocations at once.
+fn scan_rows(local: u32, start: u32) -> u32 {
+    let base = (EACH + 1u) * local;
+    var sum = 0u;
     for (var k = 0u; k < EACH; k++) {
-        if first + k < count {
-            data[first + k] = start + parts.before[k];
+        sum += rows[base + k];
+    }
+    let scanned = workgroup_scan(local, sum);
+    var before = start + scanned.before;
+    for (var k = 0u; k < EACH; k++) {
+        let value = rows[base + k];
+        rows[base + k] = before;
+        before += value;
+    }
+    workgroupBarrier();
+    return scanned.total;
+}
+
+// Writes `rows` back. An invocation reads what it will load next, so that no barrier is needed after it.
+fn store(start: u32, local: u32, count: u32) {
+    for (var k = local; k < BLOCK; k += WORKGROUP) {
+        if start + k < count {
+            data[start + k] = rows[slot(k)];
         }
     }
 }
@@ -76,9 +97,15 @@ fn reduce(
     let count = elements();
     let block = workgroup_index(wg, num);
     let local = local_index(lid);
-    let scanned = workgroup_scan(local, load(block * BLOCK + local * EACH, count).sum);
+    var sum = 0u;
+    for (var k = local; k < BLOCK; k += WORKGROUP) {
+        if block * BLOCK + k < count {
+            sum += data[block * BLOCK + k];
+        }
+    }
+    let total = workgroup_scan(local, sum).total;
     if local == 0u && block * BLOCK < count {
-        sums[block] = scanned.total;
+        sums[block] = total;
     }
 }
 
@@ -91,11 +118,9 @@ fn scan_sums(@builtin(local_invocation_index) lid: u32) {
     let count = workgroupUniformLoad(&shared_count);
     var carry = 0u;
     for (var start = 0u; start < count; start += BLOCK) {
-        let first = start + local * EACH;
-        let eight = load(first, count);
-        let scanned = workgroup_scan(local, eight.sum);
-        store(first, count, carry + scanned.before, eight);
-        carry += scanned.total;
+        load(start, local, count);
+        carry += scan_rows(local, carry);
+        store(start, local, count);
     }
     if local == 0u && params.total_word != NO_WORD {
         counts[params.total_word] = carry;
@@ -111,10 +136,12 @@ fn scan_blocks(
     let count = elements();
     let block = workgroup_index(wg, num);
     let local = local_index(lid);
-    let first = block * BLOCK + local * EACH;
-    let eight = load(first, count);
-    let scanned = workgroup_scan(local, eight.sum);
-    if first < count {
-        store(first, count, sums[block] + scanned.before, eight);
+    let start = block * BLOCK;
+    var before = 0u;
+    if start < count {
+        before = sums[block];
     }
+    load(start, local, count);
+    scan_rows(local, before);
+    store(start, local, count);
 }

@@ -56,7 +56,7 @@ pub(crate) fn crowds() -> Vec<(String, Vec<Aabb>)> {
         (r.vector(3.0) + Vec3::X * if i % 2 == 0 { 0.0 } else { 4e5 }, Vec3::splat(0.4))
     });
     add("tiny", 1000, &mut |r, _| (r.vector(1e-3), Vec3::splat(1e-4)));
-    for aabb in &mut all.iter_mut().find(|(name, _)| name == "a plane").unwrap().1[..300] {
+    for aabb in &mut all.iter_mut().find(|(name, _)| name == "a plane").unwrap().1[..60] {
         (aabb.min, aabb.max, aabb.class) = ([-FAR; 3], [FAR, 0.2, FAR], size_class(FAR));
     }
     for (i, aabb) in all.iter_mut().find(|(name, _)| name == "fixed ones").unwrap().1.iter_mut().enumerate() {

@@ -60,11 +60,12 @@ impl Gpu {
         first_that_opens(&asked, &found)
     }
 
-    /// wgpu's backend that checks everything and runs nothing, with the default limits.
+    /// wgpu's backend that checks everything and runs nothing, with the default limits and sub-group operations.
     #[cfg(feature = "noop")]
     pub fn noop() -> Self {
         // Its adapter reports unlimited limits; the default ones are what every adapter has.
-        let descriptor = wgpu::DeviceDescriptor { required_limits: Limits::default(), ..Default::default() };
+        let (required_features, required_limits) = (Features::SUBGROUP, Limits::default());
+        let descriptor = wgpu::DeviceDescriptor { required_features, required_limits, ..Default::default() };
         let (device, queue) = wgpu::Device::noop(&descriptor);
         Self::own(device, queue)
     }
@@ -94,6 +95,11 @@ impl Gpu {
     /// Whether time can be measured on the device, see [`Timer`](crate::Timer).
     pub fn has_timestamps(&self) -> bool {
         self.device.features().contains(Features::TIMESTAMP_QUERY)
+    }
+
+    /// Whether shaders may use sub-group operations, see [`Ranking`](crate::primitives::Ranking).
+    pub fn has_subgroups(&self) -> bool {
+        self.device.features().contains(Features::SUBGROUP)
     }
 
     /// What went wrong since the last call, outside of any scope. Devices of our own only.
@@ -280,7 +286,7 @@ fn first_that_opens(asked: &str, adapters: &[wgpu::Adapter]) -> Result<Gpu> {
         };
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("tumble"),
-            required_features: adapter.features() & Features::TIMESTAMP_QUERY,
+            required_features: adapter.features() & (Features::TIMESTAMP_QUERY | Features::SUBGROUP),
             required_limits,
             ..Default::default()
         };

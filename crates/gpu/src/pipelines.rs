@@ -51,7 +51,9 @@ impl Shader {
         let module = naga::front::wgsl::parse_str(&composed.source).map_err(|parse| {
             error(parse.location(&composed.source).map(|place| place.line_number), parse.message().to_owned())
         })?;
-        let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), Default::default());
+        // What a device must have besides, it refuses itself where it has not.
+        let capabilities = naga::valid::Capabilities::default() | naga::valid::Capabilities::SUBGROUP;
+        let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities);
         let info = validator.validate(&module).map_err(|invalid| {
             let line = invalid.location(&composed.source).map(|place| place.line_number);
             error(line, causes(invalid.as_inner()))

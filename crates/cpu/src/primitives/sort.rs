@@ -5,18 +5,19 @@
 
 use super::exclusive_scan;
 
-/// Bits of one digit: 16 counters a pass, as on the GPU.
-pub const DIGIT_BITS: u32 = 4;
+/// Most bits of one digit: up to 256 counters a pass, as on the GPU.
+pub const DIGIT_BITS: u32 = 8;
 
 /// The digits that keys of `bits.len()` words have, least significant first, as (word, shift, bits of the digit).
-/// The last word is the least significant one; no digit spans two words.
+/// The last word is the least significant one; no digit spans two words, and those of a word share its bits evenly.
 pub fn digits(bits: &[u32]) -> Vec<(u32, u32, u32)> {
     let mut digits = Vec::new();
     for (word, &used) in bits.iter().enumerate().rev() {
-        let mut shift = 0;
-        while shift < used.min(32) {
-            digits.push((word as u32, shift, (used.min(32) - shift).min(DIGIT_BITS)));
-            shift += DIGIT_BITS;
+        let (mut shift, used) = (0, used.min(32));
+        for left in (1..=used.div_ceil(DIGIT_BITS)).rev() {
+            let width = (used - shift).div_ceil(left);
+            digits.push((word as u32, shift, width));
+            shift += width;
         }
     }
     digits
@@ -59,7 +60,9 @@ mod tests {
 
     #[test]
     fn digits_stay_within_words() {
-        assert_eq!(digits(&[2, 6]), [(1, 0, 4), (1, 4, 2), (0, 0, 2)]);
+        assert_eq!(digits(&[2, 17]), [(1, 0, 6), (1, 6, 6), (1, 12, 5), (0, 0, 2)]);
+        assert_eq!(digits(&[32]), [(0, 0, 8), (0, 8, 8), (0, 16, 8), (0, 24, 8)]);
+        assert_eq!(digits(&[9]), [(0, 0, 5), (0, 5, 4)]);
         assert_eq!(digits(&[0, 0]), []);
     }
 

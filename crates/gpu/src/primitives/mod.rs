@@ -1,12 +1,15 @@
-//! Scan and sort, and dispatch arguments from counts that only the GPU knows. Each works alone, on a user's buffers.
+//! Scan, compaction and sort, and dispatch arguments from counts that only the GPU knows. Each works alone, on a user's
+//! buffers.
 
 mod args;
+mod compact;
 mod scan;
 mod sort;
 
 pub use args::{Args, Job};
+pub use compact::{Compact, CompactOptions};
 pub use scan::{Scan, ScanOptions};
-pub use sort::{Sort, SortOptions};
+pub use sort::{Ranking, Sort, SortOptions};
 
 /// Stands for "no word" in the shaders.
 const NO_WORD: u32 = u32::MAX;

@@ -13,11 +13,9 @@ use crate::pipelines::{Pass, Pipelines};
 use crate::recorder::{Bind, Recorder};
 
 /// Elements of one workgroup.
-const BLOCK: u32 = 1024;
-/// Bits of one digit.
-const DIGIT_BITS: u32 = 4;
-/// Values of a digit.
-const DIGITS: u32 = 1 << DIGIT_BITS;
+const BLOCK: u32 = 3072;
+/// Most bits of one digit.
+const DIGIT_BITS: u32 = 8;
 
 /// What a [`Sort`] is to do.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,6 +29,17 @@ pub struct SortOptions {
     pub bits: Vec<u32>,
 }
 
+/// How a workgroup finds the order of its elements. The result is the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Ranking {
+    /// With workgroup memory alone, on any device. What [`Sort::new`] takes.
+    #[default]
+    Portable,
+    /// With sub-group operations, on devices that have `wgpu::Features::SUBGROUP` ([`Gpu::has_subgroups`]); slow where
+    /// sub-groups have fewer than 32 invocations. Measure before choosing it: `cargo bench --bench sort`.
+    Subgroup,
+}
+
 /// A sort of keys of one shape, with one u32 value each, up to some capacity. The passes are shared by all sorts of one
 /// [`Pipelines`]; the scratch, as large as the keys and values together, is its own.
 #[derive(Debug)]
@@ -38,6 +47,8 @@ pub struct Sort {
     passes: Passes,
     options: SortOptions,
     digits: Vec<Digit>,
+    /// Rows of the histogram: values of the widest digit.
+    radix: u32,
     params: wgpu::Buffer,
     keys: wgpu::Buffer,
     values: wgpu::Buffer,
@@ -63,7 +74,7 @@ struct Digit {
 }
 
 /// Where a pass reads or writes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 struct Ends<'a> {
     keys: &'a wgpu::Buffer,
     values: &'a wgpu::Buffer,
@@ -80,28 +91,46 @@ struct SortParams {
     word: u32,
     shift: u32,
     mask: u32,
-    unused: u32,
+    radix: u32,
 }
 
-/// The digits of a key, least significant first; none spans two words.
+/// The digits of a key, least significant first; none spans two words, and those of a word share its bits evenly.
 fn digits(bits: &[u32]) -> Vec<Digit> {
-    let of_word = |(word, &bits): (usize, &u32)| {
-        (0..bits).step_by(DIGIT_BITS as usize).map(move |shift| Digit {
-            word: word as u32,
-            shift,
-            mask: (1 << DIGIT_BITS.min(bits - shift)) - 1,
-        })
-    };
-    bits.iter().enumerate().rev().flat_map(of_word).collect()
+    let mut digits = Vec::new();
+    for (word, &bits) in bits.iter().enumerate().rev() {
+        let mut shift = 0;
+        for left in (1..=bits.div_ceil(DIGIT_BITS)).rev() {
+            let width = (bits - shift).div_ceil(left);
+            digits.push(Digit { word: word as u32, shift, mask: (1 << width) - 1 });
+            shift += width;
+        }
+    }
+    digits
 }
 
 impl Sort {
-    /// Makes a sort.
+    /// Makes a sort, with the ranking that works everywhere.
     ///
     /// # Errors
     /// [`Error::Invalid`] for keys of no or more than 4 words, or more than 32 bits of a word; [`Error::Capacity`] when
     /// the host's count is more than the capacity; as for [`Pipelines::pass`] and [`Gpu::create_buffer`].
     pub fn new(gpu: &Gpu, pipelines: &mut Pipelines, options: SortOptions) -> Result<Self> {
+        Self::with_ranking(gpu, pipelines, options, Ranking::Portable)
+    }
+
+    /// Makes a sort with this ranking.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for sub-group ranking on a device without sub-group operations; as for [`Sort::new`].
+    pub fn with_ranking(gpu: &Gpu, pipelines: &mut Pipelines, options: SortOptions, ranking: Ranking) -> Result<Self> {
+        let scatter = match ranking {
+            Ranking::Portable => "primitives/sort",
+            Ranking::Subgroup if gpu.has_subgroups() => "primitives/sort_subgroup",
+            Ranking::Subgroup => {
+                let (value, allowed) = ("Subgroup".into(), "Portable, since the device lacks Features::SUBGROUP");
+                return Err(Error::Invalid { what: "Sort".into(), field: "ranking", value, allowed });
+            }
+        };
         let allowed = "1 to 4 entries of 0 to 32";
         if !(1..=4).contains(&options.bits.len()) || options.bits.iter().any(|bits| *bits > 32) {
             let value = format!("{:?}", options.bits);
@@ -109,37 +138,40 @@ impl Sort {
         }
         let passes = Passes {
             count_digits: pipelines.pass(gpu, "primitives/sort", "count_digits")?,
-            scatter: pipelines.pass(gpu, "primitives/sort", "scatter")?,
+            scatter: pipelines.pass(gpu, scatter, "scatter")?,
             copy: pipelines.pass(gpu, "primitives/sort", "copy")?,
         };
+        let digits = digits(&options.bits);
+        let radix = digits.iter().map(|digit| digit.mask + 1).max().unwrap_or(1);
         let capacity = options.capacity;
         let scan_options = ScanOptions { capacity, count: options.count, total: None };
-        let scan = Scan::shaped(gpu, pipelines, scan_options, Shape { per: BLOCK, times: DIGITS })?;
+        let scan = Scan::shaped(gpu, pipelines, scan_options, Shape { per: BLOCK, times: radix })?;
         let args = match options.count {
             Count::Host(_) => None,
             Count::Word(word) => {
-                let jobs = [Job::new(word, capacity, BLOCK), Job::new(word, capacity, Scan::BLOCK / DIGITS * BLOCK)];
+                let jobs = [Job::new(word, capacity, BLOCK), Job::new(word, capacity, Scan::BLOCK / radix * BLOCK)];
                 Some(Args::new(gpu, pipelines, &jobs)?)
             }
         };
-        let digits = digits(&options.bits);
         let [elements, words, steps] = [capacity.into(), options.bits.len() as u64, digits.len() as u64];
         let storage = BufferUsages::STORAGE;
         let uniform = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
         let mut sort = Self {
             passes,
             params: gpu.create_buffer("sort params", steps * UNIFORM_STEP, uniform)?,
-            keys: gpu.create_buffer("sort keys", elements * words * 4, storage)?,
-            values: gpu.create_buffer("sort values", elements * 4, storage)?,
+            // The result may stay here, to be copied by the caller.
+            keys: gpu.create_buffer("sort keys", elements * words * 4, storage | BufferUsages::COPY_SRC)?,
+            values: gpu.create_buffer("sort values", elements * 4, storage | BufferUsages::COPY_SRC)?,
             histogram: gpu.create_buffer(
                 "sort histogram",
-                u64::from(capacity.div_ceil(BLOCK)) * u64::from(DIGITS) * 4,
+                u64::from(capacity.div_ceil(BLOCK)) * u64::from(radix) * 4,
                 storage,
             )?,
             no_counts: gpu.create_buffer("sort without counts", 4, storage)?,
             scan,
             args,
             digits,
+            radix,
             options,
         };
         sort.write(gpu, sort.options.count)?;
@@ -177,10 +209,22 @@ impl Sort {
         let (count, count_word) = count.words();
         let words = self.options.bits.len() as u32;
         for (step, &Digit { word, shift, mask }) in self.digits.iter().enumerate() {
-            let params = SortParams { count, count_word, capacity, words, word, shift, mask, unused: 0 };
+            let params = SortParams { count, count_word, capacity, words, word, shift, mask, radix: self.radix };
             gpu.queue.write_buffer(&self.params, step as u64 * UNIFORM_STEP, bytemuck::bytes_of(&params));
         }
         Ok(())
+    }
+
+    /// Bytes that a sort of `count` elements reads and writes, all passes together, by the algorithm: each digit's pass
+    /// reads the word with the digit, reads and writes keys and values, and goes through the histogram five times
+    /// (written, summed, read and written by the scan, read). The copy that ends [`Sort::record`] when the number of
+    /// digits is odd counts as well.
+    pub fn traffic_bytes(&self, count: u32) -> u64 {
+        let elements = u64::from(count);
+        let moved = 2 * 4 * elements * (self.options.bits.len() as u64 + 1);
+        let histogram = 4 * u64::from(count.div_ceil(BLOCK)) * u64::from(self.radix);
+        let digits = self.digits.len() as u64;
+        digits * (4 * elements + moved + 5 * histogram) + (digits % 2) * moved
     }
 
     /// Records the sort of `keys` (element i's words from i * words on) and `values`, both storage, both sorted in
@@ -195,6 +239,28 @@ impl Sort {
         values: &wgpu::Buffer,
         counts: Option<&wgpu::Buffer>,
     ) -> Result<()> {
+        let (sorted_keys, sorted_values) = self.record_moving(recorder, keys, values, counts)?;
+        if sorted_keys == keys {
+            return Ok(());
+        }
+        let (from, to) = (Ends { keys: sorted_keys, values: sorted_values }, Ends { keys, values });
+        let counts = counts.unwrap_or(&self.no_counts);
+        self.dispatch(recorder, &self.passes.copy, &self.binds(0, counts, from, to))
+    }
+
+    /// Like [`Sort::record`], and saves its last copy: when it has run, the sorted keys and values lie in the buffers
+    /// that it returns. They are the given ones when the number of digits (of up to 8 bits, none over two words) is
+    /// even, else the sort's own scratch, good until it runs again.
+    ///
+    /// # Errors
+    /// As for [`Sort::record`].
+    pub fn record_moving<'a>(
+        &'a self,
+        recorder: &mut Recorder,
+        keys: &'a wgpu::Buffer,
+        values: &'a wgpu::Buffer,
+        counts: Option<&wgpu::Buffer>,
+    ) -> Result<(&'a wgpu::Buffer, &'a wgpu::Buffer)> {
         let counts = match (counts, &self.args) {
             (Some(counts), _) => counts,
             (None, Some(_)) => return Err(no_counts("Sort")),
@@ -203,8 +269,7 @@ impl Sort {
         if let Some(args) = &self.args {
             args.record(recorder, counts)?;
         }
-        let own = Ends { keys: &self.keys, values: &self.values };
-        let (mut from, mut to) = (Ends { keys, values }, own);
+        let (mut from, mut to) = (Ends { keys, values }, Ends { keys: &self.keys, values: &self.values });
         for step in 0..self.digits.len() {
             let [params, counted, keys_in, ..] = self.binds(step, counts, from, to);
             let histogram = Bind::new("histogram", &self.histogram);
@@ -215,10 +280,7 @@ impl Sort {
             self.dispatch(recorder, &self.passes.scatter, &[a, b, c, d, e, f, histogram])?;
             (from, to) = (to, from);
         }
-        if from == own {
-            self.dispatch(recorder, &self.passes.copy, &self.binds(0, counts, from, to))?;
-        }
-        Ok(())
+        Ok((from.keys, from.values))
     }
 
     fn binds<'a>(&'a self, step: usize, counts: &'a wgpu::Buffer, from: Ends<'a>, to: Ends<'a>) -> [Bind<'a>; 6] {
