@@ -175,7 +175,7 @@ fn compare_nearest(what: &str, world: &mut World, oracle: &Oracle, random: &mut 
     let region = region(oracle);
     let mut query = |i: usize| {
         let point = place_in(random, region) * if i % 10 == 1 { 5.0 } else { 1.0 };
-        let max_distance = if i % 3 == 0 { random.range(0.0, 2.0) } else { f32::INFINITY };
+        let max_distance = if i.is_multiple_of(3) { random.range(0.0, 2.0) } else { f32::INFINITY };
         NearestQuery { point, max_distance }
     };
     let queries: Vec<_> = (0..2000).map(&mut query).collect();

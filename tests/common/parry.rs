@@ -55,7 +55,7 @@ impl Oracle {
         let endless = (0..entries.len()).filter(|&i| is_endless(&entries[i])).collect();
         let ends = entries.iter().enumerate().filter(|(_, entry)| !is_endless(entry));
         let boxes: Vec<(usize, Aabb)> = ends.map(|(i, e)| (i, e.shape.compute_aabb(&e.pose))).collect();
-        Self { bvh: Bvh::from_iter(BvhBuildStrategy::Binned, boxes.into_iter()), entries, endless }
+        Self { bvh: Bvh::from_iter(BvhBuildStrategy::Binned, boxes), entries, endless }
     }
 
     /// The collider of this handle.

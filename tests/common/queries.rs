@@ -78,7 +78,7 @@ pub(crate) fn rays_in(oracle: &Oracle, count: usize, random: &mut Random) -> Vec
             0 => random.range(0.0, 5.0) / direction.length(),
             _ => f32::INFINITY,
         };
-        Ray { origin, direction, max_time_of_impact, solid: i % 2 == 0 }
+        Ray { origin, direction, max_time_of_impact, solid: i.is_multiple_of(2) }
     };
     (0..count).map(&mut ray).collect()
 }
@@ -90,7 +90,10 @@ pub(crate) fn shapes_in(oracle: &Oracle, count: usize, random: &mut Random) -> V
         let scale = 4f32.powf(random.range(-2.0, 1.5));
         let rotation = if i % 4 < 2 { random.rotation() } else { Quat::IDENTITY };
         match i % 2 {
-            0 => OverlapShape::Ball { center, radius: if i % 10 == 0 { 0.0 } else { scale * random.range(0.1, 1.0) } },
+            0 => OverlapShape::Ball {
+                center,
+                radius: if i.is_multiple_of(10) { 0.0 } else { scale * random.range(0.1, 1.0) },
+            },
             _ => {
                 let half_extents = scale * Vec3::from_array(std::array::from_fn(|_| random.range(0.0, 1.0)));
                 OverlapShape::Cuboid { center, half_extents, rotation: rotation * 1.5 }
