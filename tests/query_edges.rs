@@ -350,3 +350,14 @@ fn queries_do_not_disturb() {
         assert_eq!(worlds::hash(&mut asked), worlds::hash(&mut left), "{side:?}");
     }
 }
+
+/// README.md shows what the documentation tests run. Oracle: the documentation.
+#[test]
+fn the_readme_agrees() {
+    let (readme, world) = (include_str!("../README.md"), include_str!("../src/world.rs"));
+    let begin = "let hits = world.cast_rays(";
+    let shown = &readme[readme.find(begin).expect("the example")..];
+    let shown = &shown[..shown.find("```").expect("its end")];
+    let documented: Vec<_> = world.lines().filter_map(|line| line.strip_prefix("    /// ")).collect();
+    assert!(documented.join("\n").contains(shown.trim_end()), "{shown}");
+}
