@@ -12,7 +12,6 @@ mod random;
 mod worlds;
 
 use queries::{ask_all, crowd, questions};
-use random::Random;
 use tumble::World;
 use tumble_core::glam::Vec3;
 use tumble_core::layout::{NO_COLLIDER, NO_NODE, QueryAnswer, TreeNode};
@@ -24,13 +23,28 @@ use worlds::{SIDES, Side};
 /// How far two answers may be apart, m.
 const NEAR: f32 = 2e-5;
 
+/// Balls along the three axes at distances that halve and halve, and some at the origin: each split leaves one aside, so
+/// that trees are as deep as codes are long.
+fn deep() -> Scene {
+    let mut scene = Scene::new();
+    let mut ball = |at: Vec3, radius: f32| {
+        scene.insert(RigidBodyBuilder::fixed().translation(at), ColliderBuilder::ball(radius));
+    };
+    for k in 0..21 {
+        let far = 1000.0 * 2f32.powi(-k);
+        [Vec3::X, Vec3::Y, Vec3::Z].into_iter().for_each(|axis| ball(far * axis, 0.3 * far));
+    }
+    (0..20).for_each(|_| ball(Vec3::ZERO, 1e-4));
+    scene
+}
+
 /// Oracle: the other side. Both hold the same states, since no step has run: they name the same colliders but where two are
 /// as near to a few units in the last place.
 #[test]
 fn the_sides_agree() {
-    for (seed, octaves) in [(21, 1.0), (22, 5.0)] {
-        let scene = crowd(3000, octaves, seed);
-        let mut worlds = SIDES.map(|side| side.world(&scene, &Params::default()));
+    for (seed, scene) in [(21, crowd(3000, 1.0, 21)), (22, crowd(3000, 5.0, 22)), (23, deep())] {
+        let params = Params { morton_bits: MortonBits::Bits63, ..Params::default() };
+        let mut worlds = SIDES.map(|side| side.world(&scene, &params));
         let (rays, shapes, points) = questions(&mut worlds[0], 6000, seed);
         let [cpu, gpu] = worlds.each_mut().map(|world| ask_all(world, &rays, &shapes, &points));
         let (mut others, mut worst) = (0, 0f32);
@@ -98,16 +112,8 @@ fn answers_do_not_hang_on_the_order_of_work() {
 /// Oracle: brute force over every leaf, bit for bit; in trees so deep that the stack of a walk has no room.
 #[test]
 fn a_walk_finds_what_a_look_at_all_leaves_does() {
-    let mut random = Random::new(41);
-    let mut deep = Scene::new();
-    for i in 0..400 {
-        // Sizes and distances from one corner halve and halve: each split leaves one body aside.
-        let scale = 2f32.powf(-(i % 60) as f32 / 3.0) * 1000.0;
-        let at = RigidBodyBuilder::fixed().translation(scale * (Vec3::ONE + 0.2 * random.vector(1.0)));
-        deep.insert(at, ColliderBuilder::ball(2.0 * scale));
-    }
     for (scene, bits) in
-        [(crowd(600, 4.0, 42), MortonBits::Bits30), (deep.clone(), MortonBits::Bits63), (deep, MortonBits::Bits30)]
+        [(crowd(600, 4.0, 42), MortonBits::Bits30), (deep(), MortonBits::Bits63), (deep(), MortonBits::Bits30)]
     {
         let packed = PackedScene::new(&scene).unwrap();
         let with_tree = Snapshot::new(&packed.colliders, &packed.states, bits);

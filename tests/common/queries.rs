@@ -113,7 +113,12 @@ pub(crate) fn questions(
     let region = region(&oracle);
     let rays = rays_in(&oracle, count, &mut random);
     let shapes = shapes_in(&oracle, count, &mut random);
-    let points = (0..count).map(|_| NearestQuery::new(place_in(&mut random, region))).collect();
+    // Every eighth around the lowest corner.
+    let point = |i: usize| match i % 8 {
+        0 => region.0 + random.vector(0.9),
+        _ => place_in(&mut random, region),
+    };
+    let points = (0..count).map(point).map(NearestQuery::new).collect();
     (rays, shapes, points)
 }
 
