@@ -74,6 +74,10 @@ fn edits_are_seen_once_a_step_has_applied_them() {
         let seen = hit(&mut world, 10.0).unwrap();
         assert_eq!((seen.collider, seen.body, seen.time_of_impact), (attached, bodies[1], 95.0), "{side:?}");
         assert_eq!(hit(&mut world, 20.0).unwrap().time_of_impact, 49.0, "{side:?}");
+        // Nothing grows, and the state is another one.
+        world.edit().set_pose(bodies[2], Vec3::new(20.0, 30.0, 0.0).into()).unwrap();
+        steps(&mut world, 1);
+        assert_eq!(hit(&mut world, 20.0).unwrap().time_of_impact, 69.0, "{side:?}");
     }
 }
 

@@ -93,6 +93,7 @@ pub struct RayHit {
 
 /// A shape in the world whose overlaps are asked for. Shapes that touch overlap.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum OverlapShape {
     /// A ball.
     Ball {

@@ -9,7 +9,7 @@ use tumble_core::layout::{
     Aabb, Control, PlacedShape, QueryAnswer, QueryInfo, QueryPoint, QueryRay, QueryVolume, query_word, tree_members,
 };
 use tumble_core::query::{self, BATCH, Nearest, NearestQuery, OverlapShape, Overlaps, Ray, RayHit};
-use tumble_core::{Editor, MortonBits, Result, Traversal};
+use tumble_core::{Editor, MortonBits, Result, Traversal, limits};
 use wgpu::BufferUsages;
 
 /// Bytes of `query_status`.
@@ -86,7 +86,7 @@ impl Query {
             return Ok(());
         }
         self.of_step = None;
-        self.write(gpu, "query_info", 0, &[QueryInfo { count: 0, collider_count, capacity: 0, pad_a: 0 }])?;
+        self.write(gpu, "query_info", 0, &[QueryInfo { collider_count, ..QueryInfo::zeroed() }])?;
         self.write(gpu, "query_status", 0, &[0u32; query_word::COUNT as usize])?;
         let empty = Control { center_min: [u32::MAX; 3], ..Control::zeroed() };
         self.write(gpu, "counters", 0, &[empty])?;
@@ -103,6 +103,11 @@ impl Query {
         Ok(())
     }
 
+    /// Overlaps that there is room for.
+    fn room(&self) -> u32 {
+        self.buffers.capacity("query_found").min(u32::MAX.into()) as u32
+    }
+
     /// Uploads queries, with room for answers of so many elements.
     fn upload<Q: Pod>(&mut self, gpu: &Gpu, name: &'static str, queries: &[Q], answers: &'static str) -> Result<()> {
         let count = queries.len() as u64;
@@ -110,8 +115,7 @@ impl Query {
             self.buffers.grow(gpu, buffer, count.next_power_of_two(), false)?;
         }
         self.write(gpu, name, 0, queries)?;
-        let capacity = self.buffers.capacity("query_found") as u32;
-        let info = QueryInfo { count: count as u32, collider_count: 0, capacity, pad_a: 0 };
+        let info = QueryInfo { count: count as u32, capacity: self.room(), ..QueryInfo::zeroed() };
         self.write(gpu, "query_info", 0, &[info])?;
         self.write(gpu, "query_status", 4 * u64::from(query_word::TURNS), &[0u32])
     }
@@ -227,9 +231,8 @@ impl Asker<'_> {
         let total = u64::from(status[query_word::TOTAL as usize]);
         let had = query.buffers.capacity("query_found");
         if total > had {
-            query.buffers.grow(gpu, "query_found", total + total / 4, false)?;
-            let capacity = query.buffers.capacity("query_found") as u32;
-            let info = QueryInfo { count: volumes.len() as u32, collider_count: 0, capacity, pad_a: 0 };
+            query.buffers.grow(gpu, "query_found", limits::grown(total), false)?;
+            let info = QueryInfo { count: volumes.len() as u32, capacity: query.room(), ..QueryInfo::zeroed() };
             query.write(gpu, "query_info", 0, &[info])?;
         }
         let found = if total == 0 {
