@@ -134,7 +134,7 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
         pair_kind as "PAIR_" {
             NONE, BALL_BALL, BALL_CUBOID, CUBOID_CUBOID, BALL_HALFSPACE, CUBOID_HALFSPACE, COUNT, MASK, FRESH
         }
-        overflow as "OVERFLOW_" { NONE, PAIRS, TURNS, LAST_BATCH, UNBOUNDED }
+        overflow as "OVERFLOW_" { NONE, PAIRS, TURNS, LAST_BATCH, UNBOUNDED, SWEEP }
         edit_op as "EDIT_" {
             SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, COLLIDER,
             COLLIDER_REMOVE

@@ -77,18 +77,18 @@ fn check_pairs(alone: &Alone, control: &Control, expected: &[[u32; 2]], what: &s
 
 #[test]
 fn brute_force_finds_the_same() {
+    let mut alones = PERMUTATIONS.map(Alone::new);
     for (name, aabbs) in crowds() {
         let boxes = Boxes::new(&aabbs);
         let expected = brute_force::find_pairs(&boxes, u32::MAX);
         let mut step = step_of(aabbs.len() as u32);
         step.pair_capacity = expected.pairs.len() as u32 + 3;
-        for permute in PERMUTATIONS {
-            let mut alone = Alone::new(permute);
-            prepare(&mut alone, &boxes, &step, &Control::zeroed());
+        for (permute, alone) in alones.iter_mut().enumerate() {
+            prepare(alone, &boxes, &step, &Control::zeroed());
             let tiles = aabbs.len() * aabbs.len().div_ceil(256);
             alone.run(|chain| chain.pass("broadphase/brute_force", "pairs", groups(tiles)));
-            let control = finish(&mut alone, &step);
-            check_pairs(&alone, &control, &expected.pairs, &format!("{name}, permuted {permute}"));
+            let control = finish(alone, &step);
+            check_pairs(alone, &control, &expected.pairs, &format!("{name}, permuted {permute}"));
         }
     }
 }
@@ -153,6 +153,7 @@ fn check_grid(alone: &Alone, boxes: &Boxes, expected: &Grid, step: &StepParams, 
 
 #[test]
 fn grids_and_their_pairs_are_the_same() {
+    let mut alones = PERMUTATIONS.map(Alone::new);
     let (mut sliced, mut listed) = (0, 0);
     for (name, aabbs) in crowds() {
         let boxes = Boxes::new(&aabbs);
@@ -167,15 +168,14 @@ fn grids_and_their_pairs_are_the_same() {
             assert!(found.pairs == expected.pairs, "{name}");
             sliced += usize::from(grid.slices.is_some());
             listed += cells.large.len();
-            for permute in PERMUTATIONS {
+            for (permute, alone) in alones.iter_mut().enumerate() {
                 let what = format!("{name}, permuted {permute}, room for {slices} slices");
-                let mut alone = Alone::new(permute);
-                prepare(&mut alone, &boxes, &step, &Control::zeroed());
-                run_grid(&mut alone, &boxes, &step, slices, false);
-                check_grid(&alone, &boxes, &grid, &step, &what);
-                let control = finish(&mut alone, &step);
+                prepare(alone, &boxes, &step, &Control::zeroed());
+                run_grid(alone, &boxes, &step, slices, false);
+                check_grid(alone, &boxes, &grid, &step, &what);
+                let control = finish(alone, &step);
                 assert_eq!(control.large_count as usize, boxes.unbounded.len() + cells.large.len(), "{what}");
-                check_pairs(&alone, &control, &expected.pairs, &what);
+                check_pairs(alone, &control, &expected.pairs, &what);
                 // Which of two in one cell looks at the other depends on the order within the cell.
                 assert_eq!(control.turns, found.turns, "{what}");
             }
@@ -258,6 +258,7 @@ fn check_tree(alone: &Alone, expected: &lbvh::Tree, words: usize, what: &str) {
 
 #[test]
 fn trees_and_their_pairs_are_the_same() {
+    let mut alones = PERMUTATIONS.map(|permute| [Alone::new(permute), Alone::new(permute)]);
     for (name, aabbs) in crowds() {
         let boxes = Boxes::new(&aabbs);
         let mut step = step_of(aabbs.len() as u32);
@@ -269,33 +270,32 @@ fn trees_and_their_pairs_are_the_same() {
         for (bits, words) in [(MortonBits::Bits30, 1), (MortonBits::Bits63, 2)] {
             for permute in PERMUTATIONS.into_iter().filter(|permute| words == 1 || *permute == 1) {
                 let what = format!("{name}, {bits:?}, permuted {permute}");
-                let mut trees = Vec::new();
-                for members in [tree_members::MOVING, tree_members::FIXED] {
+                let alones = &mut alones[permute as usize];
+                let mut mirrors = Vec::new();
+                for (members, alone) in [tree_members::MOVING, tree_members::FIXED].into_iter().zip(&mut *alones) {
                     let tree = TreeOf { count: aabbs.len(), words, members };
-                    let mut alone = Alone::new(permute);
-                    tree.put(&mut alone);
-                    prepare(&mut alone, &old, &step, &Control::zeroed());
-                    tree.build(&mut alone);
-                    tree.refit(&mut alone);
+                    tree.put(alone);
+                    prepare(alone, &old, &step, &Control::zeroed());
+                    tree.build(alone);
+                    tree.refit(alone);
                     let mut mirror = lbvh::Tree::new(&old, bits, members);
                     mirror.link_parents();
                     mirror.assert_well_formed(&old);
-                    check_tree(&alone, &mirror, words, &format!("{what}, members {members}"));
+                    check_tree(alone, &mirror, words, &format!("{what}, members {members}"));
                     // As they are now.
                     alone.put("aabbs", &aabbs);
-                    tree.refit(&mut alone);
+                    tree.refit(alone);
                     mirror.refit(&boxes);
                     mirror.assert_well_formed(&boxes);
-                    check_tree(&alone, &mirror, words, &format!("{what}, members {members}, refitted"));
-                    trees.push((alone, mirror));
+                    check_tree(alone, &mirror, words, &format!("{what}, members {members}, refitted"));
+                    mirrors.push(mirror);
                 }
                 for (traversal, pairs, across) in WALKS {
                     let what = format!("{what}, {traversal:?}");
-                    let found = lbvh::find_pairs(&trees[0].1, &trees[1].1, &boxes, traversal, u32::MAX);
+                    let found = lbvh::find_pairs(&mirrors[0], &mirrors[1], &boxes, traversal, u32::MAX);
                     assert!(found.pairs == expected.pairs, "{what}: mirror");
                     let groups = groups(aabbs.len());
-                    let (moving, fixed) = trees.split_at_mut(1);
-                    let [(moving, _), (fixed, _)] = [&mut moving[0], &mut fixed[0]];
+                    let [moving, fixed] = &mut *alones;
                     prepare(moving, &boxes, &step, &Control::zeroed());
                     moving.run(|chain| chain.pass("broadphase/lbvh", pairs, groups));
                     // What the first tree found goes on in the second one's buffers.
@@ -327,6 +327,7 @@ fn shifted(aabb: &Aabb, salt: usize) -> Aabb {
 
 #[test]
 fn a_tree_of_the_large_ones_goes_with_a_grid() {
+    let mut alones = PERMUTATIONS.map(Alone::new);
     let mut in_trees = 0;
     for (name, aabbs) in crowds() {
         let boxes = Boxes::new(&aabbs);
@@ -337,23 +338,22 @@ fn a_tree_of_the_large_ones_goes_with_a_grid() {
         let chosen = grid::choose(&boxes, &step);
         let cells = grid::fill(&chosen, &boxes, &step);
         in_trees += cells.large.len();
-        for ((traversal, pairs, across), permute) in WALKS.into_iter().zip(PERMUTATIONS) {
-            let what = format!("{name}, {traversal:?}, permuted {permute}");
+        for ((traversal, pairs, across), alone) in WALKS.into_iter().zip(&mut alones) {
+            let what = format!("{name}, {traversal:?}");
             let found = grid::find_pairs(&chosen, &cells, &boxes, Large::Tree(traversal), u32::MAX);
             assert!(found.pairs == expected.pairs, "{what}: mirror");
-            let mut alone = Alone::new(permute);
             let tree = TreeOf { count: aabbs.len(), words: 1, members: tree_members::LARGE };
-            tree.put(&mut alone);
-            prepare(&mut alone, &boxes, &step, &Control::zeroed());
-            run_grid(&mut alone, &boxes, &step, 0, true);
-            tree.build(&mut alone);
-            tree.refit(&mut alone);
+            tree.put(alone);
+            prepare(alone, &boxes, &step, &Control::zeroed());
+            run_grid(alone, &boxes, &step, 0, true);
+            tree.build(alone);
+            tree.refit(alone);
             alone.run(|chain| {
                 chain.pass("broadphase/lbvh", pairs, groups(aabbs.len()));
                 chain.pass("broadphase/lbvh", across, groups(aabbs.len()));
             });
-            let control = finish(&mut alone, &step);
-            check_pairs(&alone, &control, &expected.pairs, &what);
+            let control = finish(alone, &step);
+            check_pairs(alone, &control, &expected.pairs, &what);
             assert_eq!(control.turns, found.turns, "{what}");
         }
     }
@@ -386,7 +386,7 @@ fn too_many_pairs_or_turns_stop_the_step() {
         // The crowded cell takes 1.25e9 tests: once is enough.
         let hard = usize::from(permute > 0);
         for (many, bound, needed) in
-            [(&crowded, overflow::TURNS, 50_001), (&endless, overflow::UNBOUNDED, 8193)].into_iter().skip(hard)
+            [(&crowded, overflow::TURNS, 50_001), (&endless, overflow::UNBOUNDED, 4097)].into_iter().skip(hard)
         {
             let step = StepParams { pair_capacity: 10, ..step_of(many.len() as u32) };
             let control = run(&mut alone, &Boxes::new(many), &step, &Control::zeroed());
@@ -396,4 +396,50 @@ fn too_many_pairs_or_turns_stop_the_step() {
     let step = StepParams { pair_capacity: 10, ..step_of(limits::UNBOUNDED_LIMIT) };
     let control = run(&mut Alone::new(0), &Boxes::new(&endless[1..]), &step, &Control::zeroed());
     assert_eq!(raised(&control), [0; 4], "as many as may be");
+}
+
+/// Nearly as many turns as there may be: llvmpipe ends loops early, without a word, where their turns add up to more than
+/// 65,535. Only the very last candidate makes a pair. Oracle: analysis.
+#[test]
+fn long_searches_are_not_cut_short() {
+    let mut alone = Alone::new(0);
+    for ((traversal, pairs, _), count) in WALKS.into_iter().zip([24_900, 16_000, 24_900]) {
+        // A box as large as all, first along the curve, and specks apart from each other, of the same body but the last.
+        let mut aabbs = vec![boxed(Vec3::ZERO, Vec3::splat(1e3), 0)];
+        aabbs.extend((1..count).map(|i| {
+            let place = Vec3::new((i % 30) as f32, (i / 30 % 30) as f32, (i / 900) as f32) + 1.0;
+            boxed(place, Vec3::splat(0.1), 0)
+        }));
+        let mut moving = lbvh::Tree::new(&Boxes::new(&aabbs), MortonBits::Bits30, tree_members::MOVING);
+        let last = moving.members[count - 1];
+        aabbs[last as usize].body += 1;
+        let boxes = Boxes::new(&aabbs);
+        moving.link_parents();
+        let none = lbvh::Tree::default();
+        let found = lbvh::find_pairs(&moving, &none, &boxes, traversal, u32::MAX);
+        assert_eq!(found.pairs, [[0, last]], "{traversal:?}: mirror");
+        let most = found.most_turns;
+        assert!((45_000..=limits::TURN_LIMIT).contains(&most), "{traversal:?}: {most} turns");
+        let step = StepParams { pair_capacity: 8, ..step_of(count as u32) };
+        let tree = TreeOf { count, words: 1, members: tree_members::MOVING };
+        tree.put(&mut alone);
+        prepare(&mut alone, &boxes, &step, &Control::zeroed());
+        tree.build(&mut alone);
+        tree.refit(&mut alone);
+        alone.run(|chain| chain.pass("broadphase/lbvh", pairs, groups(count)));
+        let control = finish(&mut alone, &step);
+        check_pairs(&alone, &control, &found.pairs, &format!("{traversal:?}"));
+        assert_eq!(control.turns, found.turns, "{traversal:?}");
+    }
+    // One cell with them all.
+    let count = 40_000;
+    let mut aabbs = vec![boxed(Vec3::ONE, Vec3::splat(0.5), 0); count];
+    aabbs[count - 1].body += 1;
+    let expected: Vec<_> = (0..count as u32 - 1).map(|i| [i, count as u32 - 1]).collect();
+    let step = StepParams { pair_capacity: count as u32, ..step_of(count as u32) };
+    let boxes = Boxes::new(&aabbs);
+    prepare(&mut alone, &boxes, &step, &Control::zeroed());
+    run_grid(&mut alone, &boxes, &step, 0, false);
+    let control = finish(&mut alone, &step);
+    check_pairs(&alone, &control, &expected, "one cell");
 }

@@ -374,7 +374,7 @@ fn loops_have_bounds() {
             1000,
             Error::Capacity { buffer: "partners", needed: u64::from(specks) - 1, capacity: 50_000 },
         ),
-        ("endless", endless, 1000, Error::Capacity { buffer: "half-spaces", needed: 8193, capacity: 8192 }),
+        ("endless", endless, 1000, Error::Capacity { buffer: "half-spaces", needed: 4097, capacity: 4096 }),
         ("hub", hub, 70_000, Error::Capacity { buffer: "last batch", needed: 32_907, capacity: 32_768 }),
     ] {
         for side in SIDES {

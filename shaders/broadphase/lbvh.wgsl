@@ -385,20 +385,24 @@ fn walk_by_escapes(top: u32, end: u32, i: u32, own: Aabb) -> u32 {
     return turns;
 }
 
-// The same below node `top`. Bit k of `pending` tells that the right child at level k below it is still to be seen.
-fn walk_by_history(top: u32, i: u32, own: Aabb) -> u32 {
+// The same below node `top`; returns the turns, those `before` included. Bit k of `pending` tells that the right child at
+// level k below it is still to be seen. A turn goes down to a child, or up to the parent or over to the sibling: all in
+// one loop, since llvmpipe counts a turn of a loop within it at every turn, entered or not, and ends both too early.
+fn walk_by_history(top: u32, i: u32, own: Aabb, before: u32) -> u32 {
     var next = top;
     var depth = 0u;
     var pending = vec4<u32>(0u);
-    var turns = 1u;
+    var rising = false;
+    var turns = before + 1u;
     if !enters(top, own) {
         return turns;
     }
     while turns <= TURN_LIMIT {
         turns += 1u;
-        if next % 2u == 0u {
+        if !rising && next % 2u == 0u {
             offer(i, own, nodes[next].child);
-        } else {
+            rising = true;
+        } else if !rising {
             let left = nodes[next].child;
             let right = nodes[left].escape;
             let to_left = enters(left, own);
@@ -411,33 +415,48 @@ fn walk_by_history(top: u32, i: u32, own: Aabb) -> u32 {
                 next = select(right, left, to_left);
                 continue;
             }
-        }
-        while depth > 0u && ((pending[depth / 32u] >> (depth % 32u)) & 1u) == 0u {
-            turns += 1u;
-            depth -= 1u;
-            next = parents_of[next];
+            rising = true;
         }
         if depth == 0u {
             break;
         }
-        pending[depth / 32u] &= ~(1u << (depth % 32u));
-        next = nodes[next].escape;
+        if ((pending[depth / 32u] >> (depth % 32u)) & 1u) == 1u {
+            pending[depth / 32u] &= ~(1u << (depth % 32u));
+            next = nodes[next].escape;
+            rising = false;
+        } else {
+            depth -= 1u;
+            next = parents_of[next];
+        }
     }
     return turns;
 }
 
-// The same with a short stack; where it has no room for a node, the subtree is walked by escapes.
-fn walk_with_stack(top: u32, i: u32, own: Aabb) -> u32 {
+// The same with a short stack; where it is full, the subtree is walked by escapes, up to node `end`.
+fn walk_with_stack(top: u32, i: u32, own: Aabb, before: u32) -> u32 {
     var stack: array<u32, STACK>;
     var next = top;
     var depth = 0u;
-    var turns = 1u;
+    var escaping = false;
+    var end = NO_NODE;
+    var turns = before + 1u;
     if !enters(top, own) {
         return turns;
     }
     while turns <= TURN_LIMIT {
         turns += 1u;
-        if next % 2u == 0u {
+        if escaping {
+            let inside = enters(next, own);
+            let child = nodes[next].child;
+            if inside && next % 2u == 0u {
+                offer(i, own, child);
+            }
+            next = select(nodes[next].escape, child, inside && next % 2u == 1u);
+            if next != end {
+                continue;
+            }
+            escaping = false;
+        } else if next % 2u == 0u {
             offer(i, own, nodes[next].child);
         } else {
             let left = nodes[next].child;
@@ -445,12 +464,16 @@ fn walk_with_stack(top: u32, i: u32, own: Aabb) -> u32 {
             let to_left = enters(left, own);
             let to_right = enters(right, own);
             if to_left && to_right && depth == STACK {
-                turns += walk_by_escapes(left, nodes[next].escape, i, own);
-            } else if to_left || to_right {
-                if to_left && to_right {
-                    stack[depth] = right;
-                    depth += 1u;
-                }
+                escaping = true;
+                end = nodes[next].escape;
+                next = left;
+                continue;
+            }
+            if to_left && to_right {
+                stack[depth] = right;
+                depth += 1u;
+            }
+            if to_left || to_right {
                 next = select(right, left, to_left);
                 continue;
             }
@@ -513,7 +536,7 @@ fn pairs_by_history(
             // What hangs to the right of the way from the leaf to the root, from the leaf up.
             var top = nodes[2u * leaf].escape;
             while top != NO_NODE && turns <= TURN_LIMIT {
-                turns += walk_by_history(top, i, own);
+                turns = walk_by_history(top, i, own, turns);
                 top = nodes[top].escape;
             }
         }
@@ -537,7 +560,7 @@ fn pairs_with_stack(
             with_list(i, own);
             var top = nodes[2u * leaf].escape;
             while top != NO_NODE && turns <= TURN_LIMIT {
-                turns += walk_with_stack(top, i, own);
+                turns = walk_with_stack(top, i, own, turns);
                 top = nodes[top].escape;
             }
         }
@@ -577,7 +600,7 @@ fn across_by_history(
     let i = invocation(wg, num, lid);
     var turns = 0u;
     if runs() && i < tree.slots && leaf_count[0] != 0u && looks_across(aabbs[i]) {
-        turns = walk_by_history(root_of(leaf_count[0]), i, aabbs[i]);
+        turns = walk_by_history(root_of(leaf_count[0]), i, aabbs[i], 0u);
     }
     end_search(local_index(lid), turns);
 }
@@ -591,7 +614,7 @@ fn across_with_stack(
     let i = invocation(wg, num, lid);
     var turns = 0u;
     if runs() && i < tree.slots && leaf_count[0] != 0u && looks_across(aabbs[i]) {
-        turns = walk_with_stack(root_of(leaf_count[0]), i, aabbs[i]);
+        turns = walk_with_stack(root_of(leaf_count[0]), i, aabbs[i], 0u);
     }
     end_search(local_index(lid), turns);
 }

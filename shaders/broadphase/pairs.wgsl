@@ -6,7 +6,7 @@
 //#import shared/step.wgsl
 //#import shared/thread.wgsl
 
-const UNBOUNDED_LIMIT: u32 = 8192u;
+const UNBOUNDED_LIMIT: u32 = 4096u;
 
 @group(0) @binding(0) var<uniform> step: StepParams;
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
@@ -21,7 +21,7 @@ fn gate(@builtin(local_invocation_index) lid: u32) {
         let listed = atomicLoad(&counters[CONTROL_LARGE_COUNT]);
         if listed > UNBOUNDED_LIMIT {
             stop(OVERFLOW_UNBOUNDED, listed);
-        } else if atomicLoad(&counters[CONTROL_OVERFLOW]) == OVERFLOW_TURNS {
+        } else if atomicLoad(&counters[CONTROL_OVERFLOW]) != OVERFLOW_NONE {
             atomicStore(&counters[CONTROL_STOP], 1u); // needed was written where it was found
         } else if pairs > step.pair_capacity {
             stop(OVERFLOW_PAIRS, pairs);

@@ -15,6 +15,7 @@ const OVERFLOW_PAIRS: u32 = 1u;
 const OVERFLOW_TURNS: u32 = 2u;
 const OVERFLOW_LAST_BATCH: u32 = 3u;
 const OVERFLOW_UNBOUNDED: u32 = 4u;
+const OVERFLOW_SWEEP: u32 = 5u;
 
 const CONTROL_STOP: u32 = 0u;
 const CONTROL_OVERFLOW: u32 = 1u;

@@ -14,6 +14,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("broadphase/grid", include_str!("../broadphase/grid.wgsl")),
     ("broadphase/lbvh", include_str!("../broadphase/lbvh.wgsl")),
     ("broadphase/pairs", include_str!("../broadphase/pairs.wgsl")),
+    ("broadphase/sweep", include_str!("../broadphase/sweep.wgsl")),
     ("contact", include_str!("../contact.wgsl")),
     ("edit", include_str!("../edit.wgsl")),
     ("motion", include_str!("../motion.wgsl")),

@@ -37,7 +37,7 @@ impl Alone {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         if self.bytes.insert(name, bytes.len()) != Some(bytes.len()) {
             // Never too small for one element of a struct.
-            let usages = BufferUsages::STORAGE | BufferUsages::UNIFORM;
+            let usages = BufferUsages::STORAGE | BufferUsages::UNIFORM | BufferUsages::INDIRECT;
             self.buffers.create(gpu(), name, 1, bytes.len().max(512) as u64, usages).unwrap();
         }
         gpu().queue.write_buffer(self.buffers.buffer(name).unwrap(), 0, bytes);

@@ -15,14 +15,18 @@ pub const LAST_LIMIT: u32 = 32_768;
 /// bound.
 pub const TURN_LIMIT: u32 = 50_000;
 
-/// Most colliders without end (half-spaces), which are tested against all: the same bound, and with the above below it.
-pub const UNBOUNDED_LIMIT: u32 = 8192;
+/// Most colliders without end (half-spaces), which are tested against all. One invocation may walk along them twice, once
+/// for itself and once for one of them: with the above below the same bound.
+pub const UNBOUNDED_LIMIT: u32 = 4096;
 
 /// Most slices of a sliced grid: their sizes are added up in two words.
 pub const SLICE_LIMIT: u32 = 65_536;
 
 /// Candidates that one turn of work of the sweep looks at.
 pub const SWEEP_CHUNK: u32 = 256;
+
+/// Most such turns of all colliders together: 7e10 candidates, seconds on any GPU.
+pub const SWEEP_ITEM_LIMIT: u32 = 1 << 28;
 
 /// How large the grid's cell table is for `colliders` colliders: log2 of at least two cells each.
 pub fn cell_table_bits(colliders: u32) -> u32 {

@@ -1,10 +1,11 @@
 //! Standard scenes: counts, packing, no overlap at the start. Oracle: analysis, and the measure of overlap (itself
 //! tested in `measures.rs`).
 
-use tumble_core::glam::Vec3;
+use tumble_core::glam::{Mat3, Vec3};
 use tumble_core::layout::{body_flags, shape_kind};
 use tumble_core::measures::{initial_poses, initial_velocities, linear_momentum, penetration, state_hash};
-use tumble_core::{PackedScene, Penetration, Pose, Poses, RigidBodyType, Scene, scenes};
+use tumble_core::scenes::Crowd;
+use tumble_core::{PackedScene, Penetration, Pose, Poses, RigidBodyType, Scene, Shape, scenes};
 
 /// Dynamic bodies in a scene that packs.
 fn dynamic(scene: &Scene) -> usize {
@@ -203,4 +204,85 @@ fn the_closed_system_is_closed() {
     assert!(inwards > 100);
     assert!(linear_momentum(&scene, &velocities).is_finite());
     assert_eq!(hash(&scene), hash(&scenes::closed_system(120)));
+}
+
+/// Boxes of a crowd's bodies as they stand.
+fn bounding_boxes(scene: &Scene) -> Vec<[Vec3; 2]> {
+    let bounds = |body| {
+        let builder = scene.body(body).unwrap();
+        let (_, collider) = scene.colliders_of(body).unwrap()[0];
+        let half = match collider.shape {
+            Shape::Cuboid { half_extents: h } => {
+                let turn = Mat3::from_quat(builder.rotation);
+                turn.x_axis.abs() * h.x + turn.y_axis.abs() * h.y + turn.z_axis.abs() * h.z
+            }
+            Shape::Ball { radius } => Vec3::splat(radius),
+            _ => unreachable!(),
+        };
+        // Half of the sweep over 1/60 s.
+        let sweep = builder.linvel.abs() / 120.0;
+        let middle = builder.translation + builder.linvel / 120.0;
+        [middle - half - sweep, middle + half + sweep]
+    };
+    scene.bodies().map(bounds).collect()
+}
+
+/// In a crowd a body's box meets a few others, but where all are in one place.
+#[test]
+fn crowds_are_as_dense_as_they_say() {
+    for kind in Crowd::ALL {
+        let count = if kind == Crowd::Liu { 20_000 } else { 5000 };
+        let scene = scenes::crowd(kind, count);
+        let boxes = bounding_boxes(&scene);
+        let meets = |a: &[Vec3; 2], b: &[Vec3; 2]| a[0].cmple(b[1]).all() && b[0].cmple(a[1]).all();
+        let found: usize = boxes.iter().map(|a| boxes.iter().filter(|b| meets(a, b)).count() - 1).sum();
+        let partners = found as f32 / count as f32;
+        println!("{kind}: {partners} partners");
+        match kind {
+            Crowd::OnePoint => assert_eq!(partners, 4999.0),
+            _ => assert!((2.0..8.0).contains(&partners), "{kind}: {partners} partners"),
+        }
+    }
+}
+
+#[test]
+fn crowds_are_what_they_are_called() {
+    for (kind, name) in Crowd::ALL.into_iter().zip([
+        "uniform",
+        "1:10",
+        "1:1000",
+        "clustered",
+        "onepoint",
+        "line",
+        "plane",
+        "fast",
+        "far",
+        "liu",
+    ]) {
+        assert_eq!(kind.to_string(), name);
+        for count in [0, 1, 2, 3, 257] {
+            let scene = scenes::crowd(kind, count);
+            assert_eq!((scene.len(), dynamic(&scene)), (count, count - (count + 10) / 16), "{kind} of {count}");
+            assert_eq!(hash(&scene), hash(&scenes::crowd(kind, count)), "{kind} of {count}");
+        }
+        let boxes = bounding_boxes(&scenes::crowd(kind, 5000));
+        let middles = || boxes.iter().map(|b| (b[0] + b[1]) * 0.5);
+        let sizes = || boxes.iter().map(|b| (b[1] - b[0]).max_element());
+        let spread = middles().fold(Vec3::MIN, Vec3::max) - middles().fold(Vec3::MAX, Vec3::min);
+        let ratio = sizes().fold(0.0, f32::max) / sizes().fold(f32::MAX, f32::min);
+        match kind {
+            Crowd::Ratio(asked) => assert!(ratio > 0.3 * asked && ratio < 2.5 * asked, "{ratio}"),
+            Crowd::Liu => assert!((10.0..150.0).contains(&ratio) && spread.max_element() < 100.0, "{ratio}"),
+            Crowd::Fast => assert!(sizes().fold(0.0, f32::max) > 2.5, "swept"),
+            _ => assert!(ratio < 2.5, "{kind}: {ratio}"),
+        }
+        match kind {
+            Crowd::OnePoint => assert!(spread.max_element() < 0.1),
+            Crowd::Line => assert!(spread.x > 500.0 && spread.y < 0.1 && spread.z < 0.1),
+            Crowd::Plane => assert!(spread.x > 30.0 && spread.y < 0.1 && spread.z > 30.0),
+            Crowd::Clustered => assert!(spread.min_element() > 100.0),
+            Crowd::Far => assert!(middles().all(|m| (m.length() - 8000.0).abs() < 30.0)),
+            _ => assert!(spread.min_element() > 10.0, "{spread}"),
+        }
+    }
 }

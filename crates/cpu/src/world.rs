@@ -379,6 +379,9 @@ impl Kept {
         let over = |buffer, needed: u32, capacity: u32| Err(Overflow { buffer, needed: needed.into(), capacity });
         match broadphase::too_many(&boxes, &found) {
             Some(TooMany::Turns(turns)) => return over("partners", turns, limits::TURN_LIMIT),
+            Some(TooMany::Items(count)) => {
+                return over("sweep", count.min(u32::MAX.into()) as u32, limits::SWEEP_ITEM_LIMIT);
+            }
             Some(TooMany::Unbounded(count)) => return over("half-spaces", count, limits::UNBOUNDED_LIMIT),
             None => {}
         }

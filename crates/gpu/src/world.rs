@@ -432,6 +432,7 @@ impl World {
             overflow::PAIRS => ("pairs", self.sizes.pairs),
             overflow::LAST_BATCH => ("last batch", limits::LAST_LIMIT),
             overflow::UNBOUNDED => ("half-spaces", limits::UNBOUNDED_LIMIT),
+            overflow::SWEEP => ("sweep", limits::SWEEP_ITEM_LIMIT),
             _ => ("partners", limits::TURN_LIMIT),
         };
         let error = Error::Capacity { buffer, needed, capacity: capacity.into() };

@@ -21,6 +21,8 @@ pub mod overflow {
     pub const LAST_BATCH: u32 = 3;
     /// More colliders without end than a shader's loop may visit.
     pub const UNBOUNDED: u32 = 4;
+    /// More items of work of the sweep than `SWEEP_ITEM_LIMIT`.
+    pub const SWEEP: u32 = 5;
 }
 
 /// Counters and decisions of a step, kept where the passes run. 448 bytes.

@@ -4,11 +4,13 @@
 //! no restitution, a fixed half-space as the floor at y = 0. Angles are in radians. The same call gives the same
 //! bits every time.
 
+mod crowds;
 mod heaps;
 mod motion;
 mod random;
 mod stacks;
 
+pub use crowds::{Crowd, crowd};
 pub use heaps::{balls, balls_seeded, mixed, mixed_seeded, pile, pile_seeded};
 pub use motion::{bouncing_ball, bullet, closed_system, cradle, free_box, free_fall, ramp, sliding_box, slip_to_roll};
 pub use stacks::{column, hub, mass_ratio, overlap_cube, pyramid};

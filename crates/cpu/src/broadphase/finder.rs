@@ -1,8 +1,8 @@
 //! Runs the broad phase that was asked for, and keeps what outlives a step: trees.
 
-use super::{Boxes, Found, brute_force, grid, lbvh};
+use super::{Boxes, Found, brute_force, grid, lbvh, sweep};
 use tumble_core::edit::Stale;
-use tumble_core::layout::{Aabb, StepParams, TreeNode, tree_members};
+use tumble_core::layout::{StepParams, tree_members};
 use tumble_core::wear::Wear;
 use tumble_core::{Broadphase, MortonBits, Params, Traversal};
 
@@ -41,6 +41,10 @@ impl Finder {
                 self.wear.walked(step.step, found.turns);
                 self.bytes = self.moving.bytes() + self.fixed.bytes();
                 found
+            }
+            Broadphase::SweepAndPrune => {
+                self.bytes = sweep::BYTES * boxes.aabbs.len() as u64;
+                sweep::find_pairs(boxes, most)
             }
             kind => {
                 let mut grid = grid::choose(boxes, step);
@@ -89,17 +93,3 @@ impl Finder {
 
 /// So many colliders outside the grid are tested against all; more get a tree.
 const LIST: usize = 64;
-
-impl grid::Cells {
-    fn bytes(&self) -> u64 {
-        (4 * self.start.len() + size_of::<Aabb>() * self.entries.len() + 4 * self.large.len()) as u64
-    }
-}
-
-impl lbvh::Tree {
-    /// Bytes of all arrays.
-    pub(crate) fn bytes(&self) -> u64 {
-        let leaf = 8 + 4 + 2 * size_of::<TreeNode>() + 4 + 2 * 24;
-        (leaf * self.members.len() + 4 * self.parents.len()) as u64
-    }
-}

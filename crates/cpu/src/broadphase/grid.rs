@@ -15,7 +15,7 @@
 //! Coordinates are one multiplication, and cells are 1/16 wider than their class, which outweighs its rounding up to 2^19
 //! cells from the origin; beyond, coordinates stop there, which keeps neighbours neighbours.
 
-use super::{Boxes, CLASSES, Found, Sink, bounded, center, collect, lbvh, matter, overlaps};
+use super::{Boxes, CLASSES, Found, Query, Sink, bounded, center, collect, lbvh, matter};
 use std::ops::Range;
 use tumble_core::layout::{Aabb, StepParams};
 use tumble_core::limits::SLICE_LIMIT;
@@ -293,6 +293,11 @@ pub fn fill(grid: &Grid, boxes: &Boxes, step: &StepParams) -> Cells {
 }
 
 impl Cells {
+    /// Bytes of all arrays.
+    pub fn bytes(&self) -> u64 {
+        (4 * self.start.len() + size_of::<Aabb>() * self.entries.len() + 4 * self.large.len()) as u64
+    }
+
     /// Panics unless every collider of the grid stands once, in its own cell, and the others are large ones.
     pub fn assert_well_formed(&self, grid: &Grid, boxes: &Boxes) {
         let cell_of = |i: u32| match &boxes.aabbs[i as usize] {
@@ -314,9 +319,10 @@ pub fn find_pairs(grid: &Grid, cells: &Cells, boxes: &Boxes, large: Large, most:
             let mut list = [&boxes.unbounded[..], &cells.large[..]].concat();
             list.sort_unstable();
             collect(boxes, &list, cells.entries.len(), most, |range, sink| {
+                let mut ahead = Ahead::default();
                 for k in range {
                     sink.with_list(boxes, &list, cells.entries[k].class);
-                    let candidates = partners(grid, cells, k, sink);
+                    let candidates = partners(grid, cells, &mut ahead, k, sink);
                     sink.took(candidates);
                 }
             })
@@ -328,11 +334,12 @@ pub fn find_pairs(grid: &Grid, cells: &Cells, boxes: &Boxes, large: Large, most:
             }
             let held = cells.entries.len();
             collect(boxes, &boxes.unbounded, held + cells.large.len(), most, |range, sink| {
+                let mut ahead = Ahead::default();
                 for k in range {
                     let i = if k < held { cells.entries[k].class } else { tree.members[k - held] };
                     sink.with_list(boxes, &boxes.unbounded, i);
                     if k < held {
-                        let candidates = partners(grid, cells, k, sink);
+                        let candidates = partners(grid, cells, &mut ahead, k, sink);
                         sink.took(candidates);
                         let turns = tree.partners_of(boxes, i, traversal, sink);
                         sink.took(turns);
@@ -346,25 +353,52 @@ pub fn find_pairs(grid: &Grid, cells: &Cells, boxes: &Boxes, large: Large, most:
     }
 }
 
+/// Ranges of entries in the cells ahead of one cell; those of neighbours in the table are one.
+#[derive(Default)]
+struct Ahead {
+    cell: [i32; 3],
+    /// End of the cell itself.
+    end: usize,
+    ranges: [Range<usize>; 13],
+    count: usize,
+}
+
+impl Ahead {
+    /// Of this cell. Entries come cell by cell, so it often is the one of before.
+    fn turn_to(&mut self, grid: &Grid, cells: &Cells, cell: [i32; 3]) {
+        if self.end > 0 && self.cell == cell {
+            return;
+        }
+        self.cell = cell;
+        self.end = cells.start[grid.index(cell) + 1] as usize;
+        self.count = 0;
+        grid.ahead(cell, |range| {
+            if !range.is_empty() {
+                let entries = cells.start[range.start] as usize..cells.start[range.end] as usize;
+                self.ranges[self.count] = entries.clone();
+                self.count += usize::from(!entries.is_empty());
+            }
+        });
+    }
+}
+
 /// Pairs of entry `k` with those behind it in its own cell and those of the cells ahead; returns how many there were to
 /// look at.
-fn partners(grid: &Grid, cells: &Cells, k: usize, sink: &mut Sink) -> u32 {
+#[inline]
+fn partners(grid: &Grid, cells: &Cells, ahead: &mut Ahead, k: usize, sink: &mut Sink) -> u32 {
     let own = &cells.entries[k];
-    let cell = grid.cell(own);
+    ahead.turn_to(grid, cells, grid.cell(own));
+    let query = Query::new(own);
     let mut candidates = 0;
     let mut visit = |range: Range<usize>| {
         candidates += range.len() as u32;
         for other in &cells.entries[range] {
-            if overlaps(own.min, own.max, other.min, other.max) && matter(own.body, other.body) {
+            if query.overlaps(other) && matter(own.body, other.body) {
                 sink.push(own.class, other.class);
             }
         }
     };
-    visit(k + 1..cells.start[grid.index(cell) + 1] as usize);
-    grid.ahead(cell, |range| {
-        if !range.is_empty() {
-            visit(cells.start[range.start] as usize..cells.start[range.end] as usize);
-        }
-    });
+    visit(k + 1..ahead.end);
+    ahead.ranges[..ahead.count].iter().cloned().for_each(visit);
     candidates
 }

@@ -10,8 +10,9 @@
 //! stackless traversal" (2024); and a leaf that begins at its own escape finds each pair once. Two other ways of walking
 //! are here to compare: history flags (Harada, GDC 2009) and a short stack.
 
-use super::{Boxes, Found, Sink, bounded, center, collect, matter, overlaps};
+use super::{Boxes, Found, Query, Sink, bounded, center, collect, matter};
 use crate::bounds::FAR;
+use crate::primitives::radix_sort_by;
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 use tumble_core::layout::{Aabb, NO_NODE, TreeNode, aabb_body, root_of, tree_members};
@@ -110,8 +111,8 @@ fn shared(codes: &[u64], a: usize, b: i64) -> i32 {
 impl Tree {
     /// A tree of all bounded colliders that are fixed, or of those that are not.
     pub fn new(boxes: &Boxes, bits: MortonBits, members: u32) -> Self {
-        let list: Vec<u32> =
-            (0..boxes.aabbs.len() as u32).filter(|&i| is_member(&boxes.aabbs[i as usize], members)).collect();
+        let member = |i: &u32| is_member(&boxes.aabbs[*i as usize], members);
+        let list: Vec<u32> = (0..boxes.aabbs.len() as u32).into_par_iter().with_min_len(4096).filter(member).collect();
         Self::of_members(boxes, &list, bits)
     }
 
@@ -119,11 +120,11 @@ impl Tree {
     pub fn of_members(boxes: &Boxes, list: &[u32], bits: MortonBits) -> Self {
         let mut tree = Self::default();
         let quantizer = Quantizer::new(boxes, bits);
-        let mut keys: Vec<(u64, u32)> =
-            list.par_iter().map(|&i| (quantizer.code(&boxes.aabbs[i as usize]), i)).collect();
-        keys.par_sort();
-        tree.codes = keys.iter().map(|key| key.0).collect();
-        tree.members = keys.iter().map(|key| key.1).collect();
+        let code = |i: u32| quantizer.code(&boxes.aabbs[i as usize]);
+        // The sort is stable, so that the lower collider comes first of equal codes.
+        let mut keys: Vec<(u64, u32)> = list.par_iter().with_min_len(1024).map(|&i| (code(i), i)).collect();
+        radix_sort_by(&mut keys, &mut Vec::new(), 0..3 * quantizer.bits, |key| key.0);
+        (tree.codes, tree.members) = keys.into_par_iter().with_min_len(4096).unzip();
         tree.link();
         tree.refit(boxes);
         tree
@@ -132,6 +133,14 @@ impl Tree {
     /// Leaves.
     pub fn count(&self) -> u32 {
         self.members.len() as u32
+    }
+
+    /// Bytes of all arrays.
+    pub fn bytes(&self) -> u64 {
+        let pyramid: usize = self.pyramid.iter().map(Vec::len).sum();
+        let words = self.members.len() + self.ends.len() + self.parents.len();
+        (8 * self.codes.len() + 4 * words + size_of::<TreeNode>() * self.nodes.len() + size_of::<Corners>() * pyramid)
+            as u64
     }
 
     /// Children, runs and escapes of all nodes.
@@ -194,7 +203,7 @@ impl Tree {
         // What hangs to the right of the way from the leaf to the root, from the leaf up.
         let (mut top, mut turns) = (first, 0);
         while top != NO_NODE && turns <= TURN_LIMIT {
-            turns += self.walk(top, own, traversal, &mut offer);
+            turns = self.walk(top, own, traversal, turns, &mut offer);
             top = self.nodes[top as usize].escape;
         }
         turns
@@ -203,32 +212,35 @@ impl Tree {
     /// Pairs of collider `i`, which is not in the tree, with all leaves; returns the turns that it took.
     pub(super) fn partners_of(&self, boxes: &Boxes, i: u32, traversal: Traversal, sink: &mut Sink) -> u32 {
         let own = &boxes.aabbs[i as usize];
-        self.walk(root_of(self.count()), own, traversal, &mut |j| {
+        let mut offer = |j: u32| {
             if matter(own.body, boxes.aabbs[j as usize].body) {
                 sink.push(i, j);
             }
-        })
+        };
+        match (root_of(self.count()), traversal) {
+            (NO_NODE, _) => 0,
+            (root, Traversal::Escape) => self.walk_by_escapes(root, NO_NODE, own, &mut offer),
+            (root, _) => self.walk(root, own, traversal, 0, &mut offer),
+        }
     }
 
-    /// Offers the colliders of all leaves below node `top` whose boxes overlap `own`; returns the turns that it took.
-    fn walk(&self, top: u32, own: &Aabb, traversal: Traversal, offer: &mut impl FnMut(u32)) -> u32 {
-        if top == NO_NODE {
-            return 0;
-        }
+    /// Offers the colliders of all leaves below node `top` whose boxes overlap `own`; returns the turns, those `before`
+    /// included.
+    fn walk(&self, top: u32, own: &Aabb, traversal: Traversal, before: u32, offer: &mut impl FnMut(u32)) -> u32 {
         match traversal {
-            Traversal::History => self.walk_by_history(top, own, offer),
-            Traversal::Stack => self.walk_with_stack(top, own, offer),
-            _ => self.walk_by_escapes(top, self.nodes[top as usize].escape, own, offer),
+            Traversal::Stack => self.walk_with_stack(top, own, before, offer),
+            _ => self.walk_by_history(top, own, before, offer),
         }
     }
 
     /// From node `top` until node `end` comes.
     fn walk_by_escapes(&self, top: u32, end: u32, own: &Aabb, offer: &mut impl FnMut(u32)) -> u32 {
+        let query = Query::new(own);
         let (mut next, mut turns) = (top, 0);
         while next != end && turns <= TURN_LIMIT {
             turns += 1;
             let node = &self.nodes[next as usize];
-            if !overlaps(own.min, own.max, node.min, node.max) {
+            if !query.overlaps(node) {
                 next = node.escape;
             } else if next % 2 == 0 {
                 offer(node.child);
@@ -240,71 +252,85 @@ impl Tree {
         turns
     }
 
-    /// Bit k of `pending` tells that the right child at level k below `top` is still to be seen.
-    fn walk_by_history(&self, top: u32, own: &Aabb, offer: &mut impl FnMut(u32)) -> u32 {
-        let (mut next, mut level, mut pending, mut turns) = (top, 0u32, 0u128, 1);
-        if !self.enters(top, own) {
+    /// Bit k of `pending` tells that the right child at level k below `top` is still to be seen. One loop, as the shader
+    /// must have it: a turn goes down to a child, or up to the parent or over to the sibling.
+    fn walk_by_history(&self, top: u32, own: &Aabb, before: u32, offer: &mut impl FnMut(u32)) -> u32 {
+        let (mut next, mut level, mut pending, mut turns) = (top, 0u32, 0u128, before + 1);
+        let mut rising = false;
+        let query = Query::new(own);
+        if !self.enters(top, &query) {
             return turns;
         }
         while turns <= TURN_LIMIT {
             turns += 1;
-            if next % 2 == 0 {
+            if !rising && next % 2 == 0 {
                 offer(self.nodes[next as usize].child);
-            } else {
+                rising = true;
+            } else if !rising {
                 let left = self.nodes[next as usize].child;
                 let right = self.nodes[left as usize].escape;
-                let (to_left, to_right) = (self.enters(left, own), self.enters(right, own));
+                let (to_left, to_right) = (self.enters(left, &query), self.enters(right, &query));
                 if to_left || to_right {
                     level += 1;
                     pending |= u128::from(to_left && to_right) << level;
                     next = if to_left { left } else { right };
                     continue;
                 }
-            }
-            while level > 0 && pending >> level & 1 == 0 {
-                turns += 1;
-                level -= 1;
-                next = self.parents[next as usize];
+                rising = true;
             }
             if level == 0 {
                 break;
             }
-            pending &= !(1 << level);
-            next = self.nodes[next as usize].escape;
+            if pending >> level & 1 == 1 {
+                pending &= !(1 << level);
+                next = self.nodes[next as usize].escape;
+                rising = false;
+            } else {
+                level -= 1;
+                next = self.parents[next as usize];
+            }
         }
         turns
     }
 
-    fn walk_with_stack(&self, top: u32, own: &Aabb, offer: &mut impl FnMut(u32)) -> u32 {
-        let (mut next, mut stack, mut depth, mut turns) = (top, [0u32; STACK], 0, 1);
-        if !self.enters(top, own) {
+    /// Where the stack is full, the subtree is walked by escapes, up to node `end`.
+    fn walk_with_stack(&self, top: u32, own: &Aabb, before: u32, offer: &mut impl FnMut(u32)) -> u32 {
+        let (mut next, mut stack, mut depth, mut turns) = (top, [0u32; STACK], 0, before + 1);
+        let (mut escaping, mut end) = (false, NO_NODE);
+        let query = Query::new(own);
+        if !self.enters(top, &query) {
             return turns;
         }
         while turns <= TURN_LIMIT {
             turns += 1;
             let node = &self.nodes[next as usize];
-            if next % 2 == 0 {
+            if escaping {
+                let inside = query.overlaps(node);
+                if inside && next % 2 == 0 {
+                    offer(node.child);
+                }
+                next = if inside && next % 2 == 1 { node.child } else { node.escape };
+                if next != end {
+                    continue;
+                }
+                escaping = false;
+            } else if next % 2 == 0 {
                 offer(node.child);
             } else {
                 let left = node.child;
                 let right = self.nodes[left as usize].escape;
-                match (self.enters(left, own), self.enters(right, own)) {
-                    (true, true) if depth == STACK => turns += self.walk_by_escapes(left, node.escape, own, offer),
-                    (true, true) => {
-                        stack[depth] = right;
-                        depth += 1;
-                        next = left;
-                        continue;
-                    }
-                    (true, false) => {
-                        next = left;
-                        continue;
-                    }
-                    (false, true) => {
-                        next = right;
-                        continue;
-                    }
-                    (false, false) => {}
+                let (to_left, to_right) = (self.enters(left, &query), self.enters(right, &query));
+                if to_left && to_right && depth == STACK {
+                    (escaping, end, next) = (true, node.escape, left);
+                    continue;
+                }
+                if to_left && to_right {
+                    stack[depth] = right;
+                    depth += 1;
+                }
+                if to_left || to_right {
+                    next = if to_left { left } else { right };
+                    continue;
                 }
             }
             if depth == 0 {
@@ -316,9 +342,9 @@ impl Tree {
         turns
     }
 
-    fn enters(&self, node: u32, own: &Aabb) -> bool {
-        let node = &self.nodes[node as usize];
-        overlaps(own.min, own.max, node.min, node.max)
+    #[inline]
+    fn enters(&self, node: u32, query: &Query) -> bool {
+        query.overlaps(&self.nodes[node as usize])
     }
 
     /// Panics unless the tree is one, over these boxes, with codes that rise.

@@ -4,18 +4,21 @@
 //! all the others one by one, whichever it is.
 
 pub mod brute_force;
+mod collect;
 mod finder;
 pub mod grid;
 pub mod lbvh;
+pub mod sweep;
 
+pub(crate) use collect::{Sink, collect};
 pub(crate) use finder::{Finder, Search};
 
 use crate::bounds::{FAR, size_class};
+use bytemuck::NoUninit;
 use rayon::prelude::*;
-use std::ops::Range;
-use std::sync::atomic::{AtomicU64, Ordering};
 use tumble_core::layout::{Aabb, aabb_body};
-use tumble_core::limits::{TURN_LIMIT, UNBOUNDED_LIMIT};
+use tumble_core::limits::{SWEEP_ITEM_LIMIT, TURN_LIMIT, UNBOUNDED_LIMIT};
+use wide::f32x4;
 
 /// Size classes that a float's exponent and two mantissa bits can tell apart.
 pub const CLASSES: usize = 1024;
@@ -83,6 +86,8 @@ pub struct Found {
     pub most_turns: u32,
     /// Turns of all, modulo 2^32.
     pub turns: u32,
+    /// Items of work of the sweep. When these are too many, nothing else was looked for.
+    pub items: u64,
 }
 
 impl Found {
@@ -100,6 +105,8 @@ pub enum TooMany {
     Turns(u32),
     /// So many colliders without end.
     Unbounded(u32),
+    /// So many items of work of the sweep.
+    Items(u64),
 }
 
 /// Whether a shader's loops would pass their bounds.
@@ -107,6 +114,9 @@ pub fn too_many(boxes: &Boxes, found: &Found) -> Option<TooMany> {
     let unbounded = boxes.unbounded.len() as u32;
     if unbounded > UNBOUNDED_LIMIT {
         return Some(TooMany::Unbounded(unbounded));
+    }
+    if found.items > SWEEP_ITEM_LIMIT.into() {
+        return Some(TooMany::Items(found.items));
     }
     (found.most_turns > TURN_LIMIT).then_some(TooMany::Turns(found.most_turns))
 }
@@ -127,6 +137,31 @@ pub fn overlaps(a_min: [f32; 3], a_max: [f32; 3], b_min: [f32; 3], b_max: [f32; 
         | (a_min[2] > b_max[2])
         | (b_min[2] > a_max[2]);
     !apart
+}
+
+/// A box to compare with many: [`overlaps`], in one comparison a side.
+pub(crate) struct Query {
+    min: f32x4,
+    max: f32x4,
+}
+
+impl Query {
+    /// For this box.
+    #[inline]
+    pub(crate) fn new(aabb: &Aabb) -> Self {
+        let [x, y, z] = aabb.min;
+        let [u, v, w] = aabb.max;
+        Self { min: f32x4::new([x, y, z, 0.0]), max: f32x4::new([u, v, w, 0.0]) }
+    }
+
+    /// Whether it overlaps or touches a box or node: three floats, a word, three floats, a word.
+    #[inline]
+    pub(crate) fn overlaps<T: NoUninit>(&self, other: &T) -> bool {
+        let [a, b, c, d, e, f, g, h]: [f32; 8] = bytemuck::cast(*other);
+        let apart = f32x4::new([a, b, c, d]).simd_gt(self.max) | self.min.simd_gt(f32x4::new([e, f, g, h]));
+        // The words have no say.
+        apart.to_bitmask() & 0b111 == 0
+    }
 }
 
 /// Whether a contact between colliders of these bodies ([`aabb_body`]) could push anything.
@@ -153,104 +188,4 @@ fn lowest(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
 
 fn highest(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|i| a[i].max(b[i]))
-}
-
-/// Where one chunk of a search leaves its pairs.
-#[derive(Debug)]
-pub(crate) struct Sink {
-    pairs: Vec<[u32; 2]>,
-    count: u64,
-    room: usize,
-    most_turns: u32,
-    turns: u32,
-}
-
-impl Sink {
-    /// A pair, in either order.
-    #[inline]
-    pub(crate) fn push(&mut self, i: u32, j: u32) {
-        self.count += 1;
-        if self.pairs.len() < self.room {
-            self.pairs.push([i.min(j), i.max(j)]);
-        }
-    }
-
-    /// The search for one collider's partners took so many turns.
-    #[inline]
-    pub(crate) fn took(&mut self, turns: u32) {
-        self.most_turns = self.most_turns.max(turns);
-        self.turns = self.turns.wrapping_add(turns);
-    }
-
-    /// Pairs of collider `i` with those of a list that it is not on.
-    #[inline]
-    pub(crate) fn with_list(&mut self, boxes: &Boxes, list: &[u32], i: u32) {
-        for &j in list {
-            if meets(&boxes.aabbs[i as usize], &boxes.aabbs[j as usize]) {
-                self.push(i, j);
-            }
-        }
-    }
-}
-
-/// Runs `search` over 0..count in chunks, in parallel, and sorts what they find. Pairs within `list`, of those that all are
-/// tested against, are added here. Beyond `most`, pairs are counted and not kept.
-pub(crate) fn collect(
-    boxes: &Boxes,
-    list: &[u32],
-    count: usize,
-    most: u32,
-    search: impl Fn(Range<usize>, &mut Sink) + Sync,
-) -> Found {
-    const CHUNK: usize = 512;
-    let total = AtomicU64::new(0);
-    let sink = || Sink { pairs: Vec::new(), count: 0, room: most as usize, most_turns: 0, turns: 0 };
-    let chunk = |chunk: usize| {
-        let mut own = sink();
-        let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(count);
-        own.pairs.reserve(4 * range.len());
-        search(range, &mut own);
-        if total.fetch_add(own.count, Ordering::Relaxed) + own.count > most.into() {
-            own.pairs = Vec::new();
-        }
-        own
-    };
-    let mut chunks: Vec<Sink> = (0..count.div_ceil(CHUNK)).into_par_iter().map(chunk).collect();
-    let mut rest = sink();
-    list.iter().enumerate().for_each(|(k, &i)| rest.with_list(boxes, &list[k + 1..], i));
-    chunks.push(rest);
-    let mut found = Found { count: chunks.iter().map(|c| c.count).sum(), ..Found::default() };
-    found.most_turns = chunks.iter().map(|c| c.most_turns).max().unwrap_or(0);
-    found.turns = chunks.iter().fold(0, |sum, c| sum.wrapping_add(c.turns));
-    if found.count <= most.into() {
-        let lists: Vec<_> = chunks.into_iter().map(|c| c.pairs).collect();
-        found.pairs = sorted(&lists, boxes.aabbs.len());
-    }
-    found
-}
-
-/// All pairs of `lists`, sorted: a counting sort by the lower collider, then each collider's few partners.
-fn sorted(lists: &[Vec<[u32; 2]>], colliders: usize) -> Vec<[u32; 2]> {
-    let mut start = vec![0u32; colliders + 1];
-    lists.iter().flatten().for_each(|pair| start[pair[0] as usize + 1] += 1);
-    for i in 0..colliders {
-        start[i + 1] += start[i];
-    }
-    let mut pairs = vec![[0; 2]; start[colliders] as usize];
-    let mut cursor = start.clone();
-    for pair in lists.iter().flatten() {
-        let at = &mut cursor[pair[0] as usize];
-        pairs[*at as usize] = *pair;
-        *at += 1;
-    }
-    let mut rest = &mut pairs[..];
-    let mut owners = Vec::with_capacity(colliders);
-    for two in start.windows(2).filter(|two| two[1] > two[0] + 1) {
-        let skip = two[0] as usize - (start[colliders] as usize - rest.len());
-        let (own, after) = rest[skip..].split_at_mut((two[1] - two[0]) as usize);
-        owners.push(own);
-        rest = after;
-    }
-    owners.into_par_iter().with_min_len(1024).for_each(|own| own.sort_unstable());
-    pairs
 }

@@ -4,6 +4,7 @@
 mod brute_force;
 mod grid;
 pub(crate) mod lbvh;
+mod sweep;
 
 use crate::primitives::{Count, Sort, SortOptions};
 use crate::store::{Sizes, word};
@@ -12,6 +13,7 @@ use brute_force::BruteForce;
 use grid::Grid;
 use lbvh::Lbvh;
 use std::sync::Arc;
+use sweep::Sweep;
 use tumble_core::edit::{Editor, Stale};
 use tumble_core::layout::StepParams;
 use tumble_core::{Broadphase as Which, MortonBits, Params, Result, Traversal};
@@ -51,16 +53,18 @@ pub(crate) struct Broadphase {
 
 enum Kind {
     BruteForce(BruteForce),
-    Grid(Grid),
-    Lbvh(Lbvh),
+    Grid(Box<Grid>),
+    Lbvh(Box<Lbvh>),
+    Sweep(Box<Sweep>),
 }
 
 impl Broadphase {
     pub(crate) fn new(gpu: &Gpu, pipelines: &mut Pipelines, sizes: &Sizes, choice: &Choice) -> Result<Self> {
         let kind = match choice.which {
             Which::BruteForce => Kind::BruteForce(BruteForce::new(gpu, pipelines)?),
-            Which::Lbvh => Kind::Lbvh(Lbvh::new(gpu, pipelines, sizes, choice)?),
-            _ => Kind::Grid(Grid::new(gpu, pipelines, sizes, choice)?),
+            Which::Lbvh => Kind::Lbvh(Box::new(Lbvh::new(gpu, pipelines, sizes, choice)?)),
+            Which::SweepAndPrune => Kind::Sweep(Box::new(Sweep::new(gpu, pipelines, sizes)?)),
+            _ => Kind::Grid(Box::new(Grid::new(gpu, pipelines, sizes, choice)?)),
         };
         let bits = 32 - sizes.colliders.saturating_sub(1).leading_zeros();
         let by_pair = SortOptions { capacity: sizes.pairs, count: Count::Word(word::PAIR_COUNT), bits: vec![bits; 2] };
@@ -77,6 +81,7 @@ impl Broadphase {
             Kind::BruteForce(_) => 0,
             Kind::Grid(grid) => grid.bytes(),
             Kind::Lbvh(lbvh) => lbvh.bytes(),
+            Kind::Sweep(sweep) => sweep.bytes(),
         }
     }
 
@@ -91,6 +96,7 @@ impl Broadphase {
             Kind::BruteForce(_) => Ok(()),
             Kind::Grid(grid) => grid.prepare(gpu, step),
             Kind::Lbvh(lbvh) => lbvh.prepare(gpu, step, stale),
+            Kind::Sweep(sweep) => sweep.prepare(gpu, step),
         }
     }
 
@@ -107,6 +113,7 @@ impl Broadphase {
             Kind::BruteForce(brute_force) => brute_force.record(recorder, step)?,
             Kind::Grid(grid) => grid.record(recorder, step)?,
             Kind::Lbvh(lbvh) => lbvh.record(recorder, step)?,
+            Kind::Sweep(sweep) => sweep.record(recorder, step)?,
         }
         recorder.dispatch(&self.gate, &[], 1)?;
         let (keys, values) = (buffers.buffer("pair_keys")?, buffers.buffer("pair_values")?);
