@@ -1,8 +1,7 @@
 // Where broad phases leave their pairs: in any order, since they are sorted afterwards (broadphase/pairs.wgsl). Bindings 0
 // to 4 are here.
 //
-// An invocation keeps a few pairs to itself and takes places for them at once. Past the list's end pairs are only
-// counted. Colliders on large_list, those without end above all, are tested against all others one by one.
+// Past the list's end pairs are only counted. Colliders on large_list, those without end above all, are tested against all others one by one.
 
 //#import shared/aabb.wgsl
 //#import shared/control.wgsl
@@ -11,7 +10,6 @@
 const TURN_LIMIT: u32 = 50000u; // turns of one invocation's search
 const UNBOUNDED_LIMIT: u32 = 4096u; // and of each of its two walks along large_list
 const MOST_COUNTED: u32 = 0x80000000u; // the count stops before it wraps
-const KEPT: u32 = 8u;
 
 @group(0) @binding(0) var<uniform> step: StepParams;
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
@@ -19,39 +17,17 @@ const KEPT: u32 = 8u;
 @group(0) @binding(3) var<storage, read_write> large_list: array<u32>;
 @group(0) @binding(4) var<storage, read_write> pair_keys: array<u32>;
 
-var<private> kept: array<vec2<u32>, KEPT>;
-var<private> kept_count: u32;
 var<workgroup> all_turns: atomic<u32>; // zero at first, like all workgroup memory
 
-// A pair, in either order.
+// A pair, in either order. Drivers add up such additions of one to one place over a sub-group; keeping some pairs back to
+// take places for them at once took 1.7 times as long on llvmpipe.
 fn keep_pair(i: u32, j: u32) {
-    kept[kept_count] = vec2<u32>(min(i, j), max(i, j));
-    kept_count += 1u;
-    if kept_count == KEPT {
-        write_kept();
-    }
-}
-
-// Without a loop: within a loop, llvmpipe may count a turn of another one at every turn, entered or not.
-fn write_kept() {
-    if kept_count != 0u && atomicLoad(&counters[CONTROL_PAIR_COUNT]) < MOST_COUNTED {
-        let first = atomicAdd(&counters[CONTROL_PAIR_COUNT], kept_count);
-        write_pair(first, 0u);
-        write_pair(first, 1u);
-        write_pair(first, 2u);
-        write_pair(first, 3u);
-        write_pair(first, 4u);
-        write_pair(first, 5u);
-        write_pair(first, 6u);
-        write_pair(first, 7u);
-    }
-    kept_count = 0u;
-}
-
-fn write_pair(first: u32, k: u32) {
-    if k < kept_count && first + k < step.pair_capacity {
-        pair_keys[2u * (first + k)] = kept[k].x;
-        pair_keys[2u * (first + k) + 1u] = kept[k].y;
+    if atomicLoad(&counters[CONTROL_PAIR_COUNT]) < MOST_COUNTED {
+        let place = atomicAdd(&counters[CONTROL_PAIR_COUNT], 1u);
+        if place < step.pair_capacity {
+            pair_keys[2u * place] = min(i, j);
+            pair_keys[2u * place + 1u] = max(i, j);
+        }
     }
 }
 
@@ -87,7 +63,6 @@ fn within_list(place: u32) {
 
 // Ends every invocation's search, which took so many turns; all invocations of a workgroup come here.
 fn end_search(local: u32, turns: u32) {
-    write_kept();
     if turns > TURN_LIMIT {
         atomicMax(&counters[CONTROL_OVERFLOW], OVERFLOW_TURNS);
         atomicMax(&counters[CONTROL_NEEDED], turns);

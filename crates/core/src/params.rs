@@ -10,7 +10,7 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum Broadphase {
-    /// The one that the scene's size, count and extent call for, see [`Broadphase::for_scene`].
+    /// The one that the scene's size, count and extent call for, see [`Broadphase::resolve`].
     #[default]
     Auto,
     /// Every collider against every other: for tiny worlds, and as an oracle.
