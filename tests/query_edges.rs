@@ -15,6 +15,7 @@ use parry::Oracle;
 use queries::rays_in;
 use random::Random;
 use tumble_core::glam::{Quat, Vec3};
+use tumble_core::limits::{TURN_LIMIT, UNBOUNDED_LIMIT};
 use tumble_core::{
     Capacities, ColliderBuilder, Error, NearestQuery, OverlapShape, Params, Ray, Result, RigidBodyBuilder, Scene,
     scenes,
@@ -255,13 +256,14 @@ fn bad_values_are_named() {
 fn loops_have_bounds() {
     for side in SIDES {
         let mut scene = Scene::new();
-        for i in 0..25_100 {
+        for i in 0..TURN_LIMIT as usize / 2 + 100 {
             let at = Vec3::new((i % 160) as f32, (i / 160) as f32, 0.0);
             scene.insert(RigidBodyBuilder::fixed().translation(at), ColliderBuilder::ball(0.4));
         }
         let mut world = side.world(&scene, &Params::default());
         let over = |radius| OverlapShape::Ball { center: Vec3::new(80.0, 80.0, 0.0), radius };
-        let too_many = Error::Capacity { buffer: "query", needed: 50_001, capacity: 50_000 };
+        let most = u64::from(TURN_LIMIT);
+        let too_many = Error::Capacity { buffer: "query", needed: most + 1, capacity: most };
         let error = world.overlaps(&[over(1.0), over(1000.0), over(2.0)]).map(|lists| lists.all().len()).unwrap_err();
         assert_eq!(error, too_many, "{side:?}");
         assert!(error.to_string().contains("smaller"), "{error}");
@@ -269,7 +271,8 @@ fn loops_have_bounds() {
         assert!((fewer[0].len() as f32 / (70.4f32 * 70.4 * std::f32::consts::PI) - 1.0).abs() < 0.01, "{side:?}");
 
         // All in one place, so that none is nearer than another.
-        for (count, fits) in [(24_990, true), (25_010, false)] {
+        let half = TURN_LIMIT as usize / 2;
+        for (count, fits) in [(half - 10, true), (half + 10, false)] {
             let mut scene = Scene::new();
             (0..count).for_each(|_| _ = scene.insert(RigidBodyBuilder::fixed(), ColliderBuilder::ball(0.4)));
             let first = scene.bodies().next();
@@ -293,14 +296,25 @@ fn loops_have_bounds() {
             assert!(world.cast_rays_any(&[down(0.0)]).unwrap()[0], "{side:?}");
         }
 
-        let mut scene = Scene::new();
-        for _ in 0..8193 {
+        let (mut scene, most) = (Scene::new(), u64::from(UNBOUNDED_LIMIT));
+        for _ in 0..=UNBOUNDED_LIMIT {
             scene.insert(RigidBodyBuilder::fixed(), ColliderBuilder::halfspace(Vec3::Y));
         }
         let mut world = side.world(&scene, &Params::default());
-        let too_many = Error::Capacity { buffer: "half-spaces", needed: 8193, capacity: 8192 };
+        let too_many = Error::Capacity { buffer: "half-spaces", needed: most + 1, capacity: most };
         assert_eq!(world.cast_rays(&[down(0.0)]).unwrap_err(), too_many, "{side:?}");
         assert_eq!(world.nearest(&[NearestQuery::new(Vec3::ZERO)]).unwrap_err(), too_many, "{side:?}");
+    }
+}
+
+/// Oracle: the host's constants.
+#[test]
+fn shaders_have_the_same_bounds() {
+    for stem in ["query/closest", "query/overlap"] {
+        let source = tumble_shaders::compose(stem).unwrap().source;
+        for (name, value) in [("TURN_LIMIT", TURN_LIMIT), ("UNBOUNDED_LIMIT", UNBOUNDED_LIMIT)] {
+            assert!(source.contains(&format!("const {name}: u32 = {value}u;")), "{stem}: {name}");
+        }
     }
 }
 

@@ -25,7 +25,7 @@ const STACK: u32 = 32u;
 const TURN_LIMIT: u32 = 50000u;
 
 // Most colliders without end.
-const UNBOUNDED_LIMIT: u32 = 8192u;
+const UNBOUNDED_LIMIT: u32 = 4096u;
 
 // What an invocation looks for.
 const RAY: u32 = 0u;

@@ -23,7 +23,7 @@ const PARALLEL: f32 = 1e-6;
 const TURN_LIMIT: u32 = 50000u;
 
 // Most colliders without end.
-const UNBOUNDED_LIMIT: u32 = 8192u;
+const UNBOUNDED_LIMIT: u32 = 4096u;
 
 @group(0) @binding(0) var<uniform> query_info: QueryInfo;
 @group(0) @binding(1) var<storage, read> volumes: array<QueryVolume>;

@@ -134,5 +134,6 @@ fn placed(shape: &OverlapShape, grown: f32) -> (ParryPose, Box<dyn ParryShape>) 
         OverlapShape::Cuboid { center, half_extents, rotation } => {
             (ParryPose::from_parts(center, rotation.normalize()), shape_of(Shape::Cuboid { half_extents }, grown))
         }
+        ref other => panic!("{other:?}"),
     }
 }
