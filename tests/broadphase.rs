@@ -182,7 +182,7 @@ fn too_many_pairs_are_counted() {
 fn pairs_by_parry(aabbs: &[Aabb]) -> Vec<[u32; 2]> {
     let leaf = |a: &Aabb| bounding_volume::Aabb::new(a.min.into(), a.max.into());
     let leaves = aabbs.iter().enumerate().filter(|(_, a)| bounded(a)).map(|(i, a)| (i, leaf(a)));
-    let tree = Bvh::from_iter(BvhBuildStrategy::Binned, leaves.collect::<Vec<_>>().into_iter());
+    let tree = Bvh::from_iter(BvhBuildStrategy::Binned, leaves.collect::<Vec<_>>());
     let mut pairs: Vec<[u32; 2]> = tree
         .traverse_bvtt_single_tree_parallel::<false>()
         .into_iter()
