@@ -27,8 +27,8 @@ pub(crate) struct Choice {
     bits: MortonBits,
     /// Whether colliders larger than the grid's cells have a tree.
     pub(crate) large_tree: bool,
-    /// Whether bounded colliders of fixed bodies may occur.
-    fixed: bool,
+    /// Most bounded colliders of fixed bodies.
+    fixed: u32,
 }
 
 impl Choice {
