@@ -181,7 +181,8 @@ fn steady(kind: Crowd, count: usize, cloud: &mut Cloud, rounds: usize) -> Vec<Ro
     let mut rapier = Rapier::new(&first, 1.0);
     rapier.first();
     let (step, turns) = (cloud.step, std::cell::Cell::new(0));
-    let mut runs: Vec<(&'static str, Box<dyn FnMut(&[Aabb]) -> Sample>)> = vec![
+    type Run<'a> = Box<dyn FnMut(&[Aabb]) -> Sample + 'a>;
+    let mut runs: Vec<(&'static str, Run)> = vec![
         ("grid, list", Box::new(move |f| ours::grid(f, &step, false, false))),
         ("grid, tree", Box::new(move |f| ours::grid(f, &step, false, true))),
         ("lbvh, built anew", Box::new(|f| anew.refit(f, true).0)),

@@ -32,7 +32,7 @@ impl Parry {
         let leaves: Vec<_> =
             aabbs.iter().enumerate().filter(|(_, a)| bounded(a)).map(|(i, a)| (i, aabb_of(a))).collect();
         let mut watch = Watch::new();
-        let tree = Bvh::from_iter(BvhBuildStrategy::Binned, leaves.into_iter());
+        let tree = Bvh::from_iter(BvhBuildStrategy::Binned, leaves);
         watch.lap();
         let parry = Self { tree, ..Self::default() };
         let sample = parry.walk(watch, aabbs);

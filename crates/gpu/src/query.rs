@@ -1,7 +1,7 @@
 //! Stage `query`: rays, overlaps, nearest points. Host side of `shaders/query/*.wgsl`. It is no part of a step: it runs
 //! when asked, over the committed states, and a world that is never asked has none of its buffers and passes.
 
-use crate::broadphase::lbvh::{Tree, TreeOptions};
+use crate::broadphase::lbvh::{Scratch, Tree, TreeOptions};
 use crate::primitives::{Count, Scan, ScanOptions};
 use crate::{Bind, BindCache, Buffers, Gpu, Pipelines, Readback, Recorder};
 use bytemuck::{Pod, Zeroable};
@@ -20,6 +20,7 @@ pub(crate) struct Query {
     buffers: Buffers,
     cache: BindCache,
     tree: Tree,
+    scratch: Scratch,
     scan: Scan,
     /// Slots of colliders that there is room for.
     colliders: u32,
@@ -55,7 +56,8 @@ impl Query {
         let options =
             TreeOptions { capacity: colliders, members: tree_members::ALL, bits, traversal: Traversal::Escape };
         let tree = Tree::new(gpu, pipelines, &options)?;
-        Ok(Self { buffers, cache: BindCache::new(), tree, scan, colliders, of_step: None })
+        let scratch = Scratch::new(gpu, pipelines, colliders, bits)?;
+        Ok(Self { buffers, cache: BindCache::new(), tree, scratch, scan, colliders, of_step: None })
     }
 
     /// Whether it has room for exactly so many slots of colliders.
@@ -65,7 +67,7 @@ impl Query {
 
     /// Bytes of its buffers.
     pub(crate) fn bytes(&self) -> u64 {
-        self.buffers.bytes() + self.tree.bytes()
+        self.buffers.bytes() + self.tree.bytes() + self.scratch.bytes()
     }
 
     fn write<T: Pod>(&self, gpu: &Gpu, name: &str, offset: u64, data: &[T]) -> Result<()> {
@@ -90,13 +92,14 @@ impl Query {
         self.write(gpu, "query_status", 0, &[0u32; query_word::COUNT as usize])?;
         let empty = Control { center_min: [u32::MAX; 3], ..Control::zeroed() };
         self.write(gpu, "counters", 0, &[empty])?;
-        self.tree.prepare(gpu, collider_count)?;
+        self.tree.prepare(gpu, collider_count);
+        self.scratch.prepare(gpu, collider_count)?;
         let bounds = pipelines.pass(gpu, "query/bounds", "bounds")?;
         let mut recorder = Recorder::new(gpu, &self.buffers, &mut self.cache, None);
         let of_world = ["states", "colliders"].map(|name| world.buffer(name).map(|buffer| Bind::new(name, buffer)));
         let [states, colliders] = of_world;
         recorder.dispatch(&bounds, &[states?, colliders?], collider_count.div_ceil(256))?;
-        self.tree.record_build(&mut recorder)?;
+        self.tree.record_build(&mut recorder, &self.scratch)?;
         self.tree.record_refit(&mut recorder)?;
         recorder.submit()?;
         self.of_step = Some(step);
@@ -128,7 +131,7 @@ impl Query {
         record: impl FnOnce(&mut Recorder, &Parts) -> Result<()>,
     ) -> Result<(Vec<u8>, [u32; query_word::COUNT as usize])> {
         let mut recorder = Recorder::new(gpu, &self.buffers, &mut self.cache, None);
-        record(&mut recorder, &Parts { buffers: &self.buffers, tree: self.tree.binds(), scan: &self.scan })?;
+        record(&mut recorder, &Parts { buffers: &self.buffers, tree: self.tree.walk_binds(), scan: &self.scan })?;
         let mut answered = Readback::new(gpu, "query answers", bytes, 1)?;
         let mut status = Readback::new(gpu, "query status", STATUS_BYTES, 1)?;
         answered.copy(recorder.encoder(), self.buffers.buffer(answers)?, 0);

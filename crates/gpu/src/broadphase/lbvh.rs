@@ -207,7 +207,7 @@ impl Tree {
     }
 
     /// What a walk needs: the nodes, and how many leaves there are.
-    pub(crate) fn binds(&self) -> [Bind<'_>; 2] {
+    pub(crate) fn walk_binds(&self) -> [Bind<'_>; 2] {
         [Bind::new("nodes", &self.nodes), Bind::new("leaf_count", &self.leaf_count)]
     }
 
