@@ -1,6 +1,9 @@
 //! One face for the CPU and the GPU world.
 
-use tumble_core::{Editor, Params, Poses, Result, Scene, StepReport, Velocities};
+use tumble_core::{
+    Editor, Nearest, NearestQuery, OverlapShape, Overlaps, Params, Poses, Ray, RayHit, Result, Scene, StepReport,
+    Velocities,
+};
 
 /// Where a world runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -108,6 +111,66 @@ impl World {
     /// Waits for all submitted steps; the velocity of every body, in one download.
     pub fn velocities(&mut self) -> Result<Velocities> {
         either!(self, world => world.velocities())
+    }
+
+    /// The first collider that each ray meets, or none; in the order of the rays. Where two are met at the same time, the
+    /// one of the lower slot. Like all queries it waits for all submitted steps and shows the state after them: edits are
+    /// seen once a step has applied them. Ask many at once: a batch shares one tree over all colliders, which is built
+    /// at the first query after a step.
+    ///
+    /// ```
+    /// use tumble::prelude::*;
+    ///
+    /// # fn main() -> Result<()> {
+    /// let mut scene = Scene::new();
+    /// scene.insert(RigidBodyBuilder::fixed(), ColliderBuilder::halfspace(Vec3::Y));
+    /// let ball = RigidBodyBuilder::dynamic().translation(Vec3::new(0.0, 3.0, 0.0));
+    /// let ball = scene.insert(ball, ColliderBuilder::ball(0.5));
+    /// let mut world = World::new(scene, Params::default(), Backend::Auto)?;
+    ///
+    /// let hits = world.cast_rays(&[Ray::new(Vec3::new(0.0, 9.0, 0.0), -Vec3::Y)])?;
+    /// let near = world.nearest(&[NearestQuery::new(Vec3::new(0.0, 4.0, 0.0))])?;
+    /// let overlaps = world.overlaps(&[OverlapShape::Ball { center: Vec3::ZERO, radius: 2.0 }])?;
+    /// println!("{:?} {:?} {:?}", hits[0], near[0], &overlaps[0]);
+    ///
+    /// let hit = hits[0].unwrap();
+    /// assert_eq!((hit.body, hit.collider, hit.normal), (ball.body, ball.collider, Vec3::Y));
+    /// assert!((hit.time_of_impact - 5.5).abs() < 1e-5);
+    /// assert!((near[0].unwrap().distance - 0.5).abs() < 1e-5);
+    /// assert_eq!(overlaps[0].len(), 1, "the half-space");
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Invalid`](crate::Error::Invalid) names the ray and the field. [`Error::Capacity`](crate::Error::Capacity)
+    /// when one ray meets too many nodes of the tree, or when a step wants for room. What a device may refuse.
+    pub fn cast_rays(&mut self, rays: &[Ray]) -> Result<Vec<Option<RayHit>>> {
+        either!(self, world => world.cast_rays(rays))
+    }
+
+    /// Whether each ray meets any collider: cheaper than [`cast_rays`](Self::cast_rays), for lines of sight.
+    ///
+    /// # Errors
+    /// As for [`cast_rays`](Self::cast_rays).
+    pub fn cast_rays_any(&mut self, rays: &[Ray]) -> Result<Vec<bool>> {
+        either!(self, world => world.cast_rays_any(rays))
+    }
+
+    /// The colliders that each shape overlaps or touches, tested exactly, by collider slot.
+    ///
+    /// # Errors
+    /// As for [`cast_rays`](Self::cast_rays).
+    pub fn overlaps(&mut self, shapes: &[OverlapShape]) -> Result<Overlaps> {
+        either!(self, world => world.overlaps(shapes))
+    }
+
+    /// The collider nearest to each point, or none. Colliders are solid: one that holds the point is at distance 0.
+    ///
+    /// # Errors
+    /// As for [`cast_rays`](Self::cast_rays).
+    pub fn nearest(&mut self, points: &[NearestQuery]) -> Result<Vec<Option<Nearest>>> {
+        either!(self, world => world.nearest(points))
     }
 
     /// Edits for the next step: insert, remove, set, push. None of them waits or rebuilds the world.

@@ -17,6 +17,7 @@ const LAYOUTS: &[&str] = &[
     "shared/edit",
     "shared/manifold",
     "shared/pair",
+    "shared/query",
     "shared/step",
     "shared/tree",
 ];
@@ -99,6 +100,12 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         EditRange { first, count }
         TreeNode { min, child, max, escape }
         TreeInfo { slots, members, words, capacity }
+        PlacedShape { position, shape, rotation, size, pad_a }
+        QueryRay { origin, max_distance, direction, solid, inverse, pad_a }
+        QueryVolume { min, pad_a, max, pad_b, placed }
+        QueryPoint { point, max_squared }
+        QueryAnswer { vector, distance, collider, pad_a, pad_b, pad_c }
+        QueryInfo { count, collider_count, capacity, pad_a }
         StepParams {
             dt, h, inverse_h, substeps, gravity, step, bias_rate, mass_scale, impulse_scale, push_speed,
             speculative_distance, restitution_threshold, body_count, collider_count, pair_capacity, cell_table_bits,
@@ -132,9 +139,10 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
             SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, COLLIDER,
             COLLIDER_REMOVE
         }
+        query_word as "QUERY_" { UNBOUNDED, TURNS, TOTAL, COUNT }
         tree_members as "MEMBERS_" { MOVING, FIXED, LARGE, ALL }
         ;
-        BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT, NO_NODE
+        BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT, NO_NODE, NO_COLLIDER
     }
 }
 

@@ -1,7 +1,8 @@
 // Where broad phases leave their pairs: in any order, since they are sorted afterwards (broadphase/pairs.wgsl). Bindings 0
 // to 4 are here.
 //
-// Past the list's end pairs are only counted. Colliders on large_list, those without end above all, are tested against all others one by one.
+// Past the list's end pairs are only counted. Colliders on large_list, those without end above all, are tested against
+// all others one by one.
 
 //#import shared/aabb.wgsl
 //#import shared/control.wgsl
@@ -19,8 +20,8 @@ const MOST_COUNTED: u32 = 0x80000000u; // the count stops before it wraps
 
 var<workgroup> all_turns: atomic<u32>; // zero at first, like all workgroup memory
 
-// A pair, in either order. Drivers add up such additions of one to one place over a sub-group; keeping some pairs back to
-// take places for them at once took 1.7 times as long on llvmpipe.
+// A pair, in either order. (Keeping some back, to take places for eight at once, took 1.7 times as long on llvmpipe; many
+// drivers add up additions of one to one place over a sub-group by themselves.)
 fn keep_pair(i: u32, j: u32) {
     if atomicLoad(&counters[CONTROL_PAIR_COUNT]) < MOST_COUNTED {
         let place = atomicAdd(&counters[CONTROL_PAIR_COUNT], 1u);

@@ -28,6 +28,8 @@ pub struct Editor {
     grown: bool,
     spread: Spread,
     stale: Stale,
+    /// Who was at a collider slot before the edits that no step has taken.
+    before: HashMap<u32, Option<(ColliderHandle, BodyHandle)>>,
 }
 
 /// Most impulses and forces on one body in one step: one loop of a shader applies them.
@@ -65,6 +67,7 @@ impl Editor {
             pushes: HashMap::new(),
             grown: false,
             stale: Stale::default(),
+            before: HashMap::new(),
         };
         Ok((editor, packed))
     }
@@ -99,9 +102,16 @@ impl Editor {
         self.records.len()
     }
 
+    /// The collider that was at this slot when edits were last taken, and its body.
+    #[doc(hidden)]
+    pub fn collider_at(&self, slot: u32) -> Option<(ColliderHandle, BodyHandle)> {
+        self.before.get(&slot).copied().unwrap_or_else(|| self.scene.collider_at(slot))
+    }
+
     /// Adds a body with its first collider.
     pub fn insert(&mut self, body: RigidBodyBuilder, collider: ColliderBuilder) -> Result<Inserted> {
         let inserted = self.scene.try_insert(body, collider)?;
+        self.before.entry(inserted.collider.slot).or_insert(None);
         self.grown = true;
         self.touch(inserted.body, true);
         let PackedBody { state, props, colliders } = pack_body(&self.scene, inserted.body)?;
@@ -124,6 +134,7 @@ impl Editor {
     pub fn attach(&mut self, body: BodyHandle, collider: ColliderBuilder) -> Result<ColliderHandle> {
         let before = pack_body(&self.scene, body)?.props;
         let handle = self.scene.attach(body, collider)?;
+        self.before.entry(handle.slot).or_insert(None);
         self.grown = true;
         self.touch(body, true);
         self.restore_props(body, &before);
@@ -140,7 +151,9 @@ impl Editor {
 
     /// Removes a body with its colliders and contacts.
     pub fn remove(&mut self, body: BodyHandle) -> Result<()> {
-        let colliders: Vec<_> = self.scene.colliders_of(body)?.into_iter().map(|(h, _)| h.slot()).collect();
+        let handles: Vec<_> = self.scene.colliders_of(body)?.into_iter().map(|(handle, _)| handle).collect();
+        handles.iter().for_each(|&handle| _ = self.before.entry(handle.slot).or_insert(Some((handle, body))));
+        let colliders: Vec<_> = handles.into_iter().map(ColliderHandle::slot).collect();
         self.touch(body, true);
         self.scene.remove(body)?;
         self.push(edit_op::REMOVE, body, [0.0; 4], [0.0; 4]);
@@ -230,6 +243,7 @@ impl Editor {
     /// Hands over the edits since the last call, for the step that begins now.
     pub fn take(&mut self) -> EditBatch {
         self.pushes.clear();
+        self.before.clear();
         if std::mem::take(&mut self.grown) {
             let needed = Plan::of(&self.scene);
             self.plan.widen(&needed);

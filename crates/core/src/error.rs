@@ -109,6 +109,8 @@ pub(crate) fn check(
 fn advice(buffer: &str) -> &'static str {
     match buffer {
         "partners" => "too many colliders lie around one place: spread them out",
+        "query" => "one query meets too many nodes of the tree: make it smaller, or ask it in parts",
+        "query_found" => "ask for fewer overlaps at once",
         "half-spaces" => "every collider is tested against each of them: use fewer, or large cuboids",
         "last batch" => {
             "too many contacts on bodies that touch more than 63 others: split those bodies or spread the others out"

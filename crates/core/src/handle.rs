@@ -80,6 +80,10 @@ impl<T> Slots<T> {
     pub(crate) fn get(&self, slot: u32, generation: u32) -> Option<&T> {
         self.entries.get(slot as usize).filter(|e| e.0 == generation).and_then(|e| e.1.as_ref())
     }
+    /// What lives at this slot, with its generation.
+    pub(crate) fn at(&self, slot: u32) -> Option<(u32, &T)> {
+        self.entries.get(slot as usize).and_then(|e| e.1.as_ref().map(|value| (e.0, value)))
+    }
     pub(crate) fn get_mut(&mut self, slot: u32, generation: u32) -> Option<&mut T> {
         self.entries.get_mut(slot as usize).filter(|e| e.0 == generation).and_then(|e| e.1.as_mut())
     }

@@ -14,18 +14,20 @@ pub struct Plan {
     pub pair_kinds: u32,
     /// Some collider bounces.
     pub restitution: bool,
-    /// Some ball or cuboid is on a fixed body.
-    pub fixed: bool,
+    /// Room for balls and cuboids on fixed bodies, which have a tree of their own: their number, rounded up to a power of
+    /// two, so that it seldom widens.
+    pub fixed: u32,
 }
 
 impl Plan {
     /// What `scene` needs.
     pub fn of(scene: &Scene) -> Self {
         let (mut balls, mut cuboids, mut halfspaces) = (0u32, 0u32, 0u32);
-        let (mut restitution, mut fixed) = (false, false);
+        let (mut restitution, mut fixed) = (false, 0u32);
         for (_, _, collider) in scene.colliders.iter() {
             let ends = !matches!(collider.builder.shape, Shape::HalfSpace { .. });
-            fixed |= ends && scene.body(collider.body).is_ok_and(|body| body.body_type == RigidBodyType::Fixed);
+            let on_fixed = scene.body(collider.body).is_ok_and(|body| body.body_type == RigidBodyType::Fixed);
+            fixed += u32::from(ends && on_fixed);
             match collider.builder.shape {
                 Shape::Ball { .. } => balls += 1,
                 Shape::Cuboid { .. } => cuboids += 1,
@@ -40,6 +42,7 @@ impl Plan {
         allow(cuboids > 1, pair_kind::CUBOID_CUBOID);
         allow(balls > 0 && halfspaces > 0, pair_kind::BALL_HALFSPACE);
         allow(cuboids > 0 && halfspaces > 0, pair_kind::CUBOID_HALFSPACE);
+        let fixed = if fixed > 0 { fixed.next_power_of_two() } else { 0 };
         Self { pair_kinds, restitution, fixed }
     }
 
@@ -48,7 +51,7 @@ impl Plan {
         let before = *self;
         self.pair_kinds |= other.pair_kinds;
         self.restitution |= other.restitution;
-        self.fixed |= other.fixed;
+        self.fixed = self.fixed.max(other.fixed);
         *self != before
     }
 

@@ -158,6 +158,12 @@ impl Scene {
         self.problem.clone().map_or(Ok(()), Err)
     }
 
+    /// The collider at this slot, and its body.
+    pub(crate) fn collider_at(&self, slot: u32) -> Option<(ColliderHandle, BodyHandle)> {
+        let (generation, entry) = self.colliders.at(slot)?;
+        Some((ColliderHandle { slot, generation }, entry.body))
+    }
+
     pub(crate) fn entry(&self, body: BodyHandle) -> Result<&BodyEntry> {
         self.bodies.get(body.slot, body.generation).ok_or(Error::StaleBody(body))
     }

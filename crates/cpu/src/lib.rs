@@ -12,6 +12,7 @@ mod math;
 pub mod motion;
 pub mod narrowphase;
 pub mod primitives;
+pub mod query;
 mod shared;
 pub mod solver;
 mod world;

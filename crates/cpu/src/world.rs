@@ -5,7 +5,7 @@ use crate::broadphase::{self, Boxes, Finder, Search, TooMany};
 use crate::contact::{self, Matched};
 use crate::shared::Shared;
 use crate::solver::{self, Rows, prepare, store};
-use crate::{bounds, edit, motion, narrowphase};
+use crate::{bounds, edit, motion, narrowphase, query};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 use std::time::Instant;
@@ -16,6 +16,7 @@ use tumble_core::layout::{
 };
 use tumble_core::limits::{self, Room};
 use tumble_core::{Broadphase, Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
+use tumble_core::{Nearest, NearestQuery, OverlapShape, Overlaps, Ray, RayHit};
 
 /// A simulation on the CPU.
 pub struct World {
@@ -29,6 +30,9 @@ pub struct World {
     growths: Vec<(&'static str, u32)>,
     drop_pair: u32,
     finder: Finder,
+    queries: query::Cached,
+    /// Why the last step did not run.
+    failed: Option<Error>,
 }
 
 /// What lives past a step; written only when a step commits (properties and colliders by edits, absolutely).
@@ -118,6 +122,8 @@ impl World {
             growths: Vec::new(),
             drop_pair: u32::MAX,
             finder: Finder::default(),
+            queries: query::Cached::default(),
+            failed: None,
         })
     }
 
@@ -177,7 +183,8 @@ impl World {
         step.cell_table_bits = limits::cell_table_bits(step.collider_count);
         step.large_limit = limits::large_limit(step.collider_count, self.editor.spread().is_wide());
         step.drop_pair = self.drop_pair;
-        if let Err(error) = self.run(&edits, step) {
+        self.failed = self.run(&edits, step).err();
+        if let Some(error) = self.failed.clone() {
             self.editor.put_back(edits);
             return Err(error);
         }
@@ -203,6 +210,49 @@ impl World {
     /// All velocities after the last step.
     pub fn velocities(&mut self) -> Result<Velocities> {
         Ok(Velocities::from_states(self.kept.control.step as u64, &self.kept.states))
+    }
+
+    /// The first collider that each ray meets, or none; in the order of the rays.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] names the ray and the field. [`Error::Capacity`] when a ray meets more nodes of the tree than a
+    /// shader's loop may, or when the last step did not run for want of room: its edits are half applied.
+    pub fn cast_rays(&mut self, rays: &[Ray]) -> Result<Vec<Option<RayHit>>> {
+        self.ask(|queries, editor| queries.cast_rays(rays, editor))
+    }
+
+    /// Whether each ray meets any collider; cheaper than [`World::cast_rays`].
+    ///
+    /// # Errors
+    /// As for [`World::cast_rays`].
+    pub fn cast_rays_any(&mut self, rays: &[Ray]) -> Result<Vec<bool>> {
+        self.ask(|queries, _| queries.cast_rays_any(rays))
+    }
+
+    /// The colliders that each shape overlaps.
+    ///
+    /// # Errors
+    /// As for [`World::cast_rays`].
+    pub fn overlaps(&mut self, shapes: &[OverlapShape]) -> Result<Overlaps> {
+        self.ask(|queries, editor| queries.overlaps(shapes, editor))
+    }
+
+    /// The collider nearest to each point, or none.
+    ///
+    /// # Errors
+    /// As for [`World::cast_rays`].
+    pub fn nearest(&mut self, points: &[NearestQuery]) -> Result<Vec<Option<Nearest>>> {
+        self.ask(|queries, editor| queries.nearest(points, editor))
+    }
+
+    /// Asks about the state after the last step.
+    fn ask<T: Send>(&mut self, ask: impl FnOnce(&query::Cached, &Editor) -> Result<T> + Send) -> Result<T> {
+        self.failed.clone().map_or(Ok(()), Err)?;
+        let (kept, editor, queries) = (&self.kept, &self.editor, &mut self.queries);
+        self.pool.install(|| {
+            queries.refresh(kept.control.step, &kept.colliders, &kept.states, self.params.morton_bits);
+            ask(queries, editor)
+        })
     }
 
     /// Plans and commits a step, growing the pair list between where that is needed and allowed.
@@ -252,7 +302,7 @@ impl World {
         report.growths = self.growths.clone();
         report.broadphase = broadphase;
         report.broadphase_bytes = self.finder.bytes();
-        report.memory_bytes = self.kept.bytes() + self.finder.bytes();
+        report.memory_bytes = self.kept.bytes() + self.finder.bytes() + self.queries.bytes();
         report.stages = watch.stages;
         self.report = report;
     }

@@ -15,6 +15,7 @@ mod motion;
 mod narrowphase;
 pub mod pipelines;
 pub mod primitives;
+mod query;
 pub mod readback;
 pub mod recorder;
 mod solver;

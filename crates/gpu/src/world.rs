@@ -1,6 +1,7 @@
 //! A world on the GPU: submission, the ring of statuses, growth and the edit log.
 
 use crate::broadphase::Choice;
+use crate::query::{Asker, Query};
 use crate::readback::{Readback, read_now};
 use crate::stages::{Built, Stages};
 use crate::store::{self, Sizes};
@@ -11,6 +12,7 @@ use tumble_core::edit::EditBatch;
 use tumble_core::layout::{BodyState, Control, LAST_BATCH, PoseRecord, StepParams, overflow};
 use tumble_core::limits::{self, Room};
 use tumble_core::{Capacities, Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
+use tumble_core::{Nearest, NearestQuery, OverlapShape, Overlaps, Ray, RayHit};
 
 /// Steps in flight before `step` waits.
 const IN_FLIGHT: usize = 3;
@@ -52,6 +54,8 @@ pub struct World {
     stage_times: Vec<StageTime>,
     growths: Vec<(&'static str, u32)>,
     drop_pair: u32,
+    /// From the first query on.
+    query: Option<Query>,
 }
 
 /// All that a step needs to be run, and run again.
@@ -119,6 +123,7 @@ impl World {
             growths: Vec::new(),
             drop_pair: u32::MAX,
             built,
+            query: None,
             cache: BindCache::new(),
             gpu,
             editor,
@@ -266,6 +271,56 @@ impl World {
         Ok(Velocities::from_states(self.last.step.into(), &bytemuck::pod_collect_to_vec::<u8, BodyState>(&bytes)))
     }
 
+    /// Waits for all submitted steps; the first collider that each ray meets, or none, in the order of the rays.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] names the ray and the field. [`Error::Capacity`] when a ray meets more nodes of the tree than a
+    /// loop may. As for [`World::step`].
+    pub fn cast_rays(&mut self, rays: &[Ray]) -> Result<Vec<Option<RayHit>>> {
+        self.asker()?.cast_rays(rays)
+    }
+
+    /// Waits for all submitted steps; whether each ray meets any collider. Cheaper than [`World::cast_rays`].
+    ///
+    /// # Errors
+    /// As for [`World::cast_rays`].
+    pub fn cast_rays_any(&mut self, rays: &[Ray]) -> Result<Vec<bool>> {
+        self.asker()?.cast_rays_any(rays)
+    }
+
+    /// Waits for all submitted steps; the colliders that each shape overlaps.
+    ///
+    /// # Errors
+    /// As for [`World::cast_rays`].
+    pub fn overlaps(&mut self, shapes: &[OverlapShape]) -> Result<Overlaps> {
+        self.asker()?.overlaps(shapes)
+    }
+
+    /// Waits for all submitted steps; the collider nearest to each point, or none.
+    ///
+    /// # Errors
+    /// As for [`World::cast_rays`].
+    pub fn nearest(&mut self, points: &[NearestQuery]) -> Result<Vec<Option<Nearest>>> {
+        self.asker()?.nearest(points)
+    }
+
+    /// Readies queries about the state after all submitted steps.
+    fn asker(&mut self) -> Result<Asker<'_>> {
+        self.run_waiting()?;
+        self.take_statuses(0)?;
+        let room = self.sizes.colliders;
+        // Slots of edits that no step has taken are empty.
+        let colliders = room.min(self.editor.collider_slots() as u32);
+        let query = match self.query.take() {
+            Some(query) if query.fits(room) => query,
+            _ => Query::new(&self.gpu, &mut self.pipelines, room, self.params.morton_bits)?,
+        };
+        let query = self.query.insert(query);
+        let (gpu, pipelines) = (&self.gpu, &mut self.pipelines);
+        query.refresh(gpu, pipelines, &self.buffers, self.submitted, colliders)?;
+        Ok(Asker { gpu, pipelines, query, editor: &self.editor })
+    }
+
     fn poses_of(&self, step: u32, bytes: &[u8]) -> Poses {
         Poses::from_records(step.into(), &bytemuck::pod_collect_to_vec::<u8, PoseRecord>(bytes))
     }
@@ -279,6 +334,7 @@ impl World {
         report.broadphase = self.built.choice.which;
         report.broadphase_bytes = self.stages.broadphase.bytes();
         report.memory_bytes = self.buffers.bytes() + self.stages.bytes();
+        report.memory_bytes += self.query.as_ref().map_or(0, Query::bytes);
         report.stages = self.stage_times.clone();
         report
     }

@@ -9,6 +9,7 @@ mod constraint;
 mod control;
 mod edit;
 mod manifold;
+mod query;
 mod step;
 mod tree;
 
@@ -18,5 +19,6 @@ pub use constraint::{ConstraintHead, ConstraintPoint, Impulse};
 pub use control::{BATCHES, Control, LAST_BATCH, QUARANTINE_NAMES, UNBATCHED, overflow};
 pub use edit::{EditRange, EditRecord, edit_op};
 pub use manifold::{FoundManifold, Manifold, ManifoldPoint, NO_SLOT, Pair, pair_kind};
+pub use query::{NO_COLLIDER, PlacedShape, QueryAnswer, QueryInfo, QueryPoint, QueryRay, QueryVolume, query_word};
 pub use step::StepParams;
 pub use tree::{NO_NODE, TreeInfo, TreeNode, root_of, tree_members};

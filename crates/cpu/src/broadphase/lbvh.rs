@@ -48,9 +48,10 @@ fn union(a: Corners, b: Corners) -> Corners {
     [std::array::from_fn(|i| a[0][i].min(b[0][i])), std::array::from_fn(|i| a[1][i].max(b[1][i]))]
 }
 
-/// Whether a collider belongs to the tree of moving or of fixed ones.
+/// Whether a collider belongs to the tree of all, or of moving, or of fixed ones.
 pub fn is_member(aabb: &Aabb, members: u32) -> bool {
-    bounded(aabb) && (aabb.body & aabb_body::FIXED != 0) == (members == tree_members::FIXED)
+    let fixed = aabb.body & aabb_body::FIXED != 0;
+    bounded(aabb) && (members == tree_members::ALL || fixed == (members == tree_members::FIXED))
 }
 
 /// Turns middles into codes: lowest middle, and codes per metre, a power of two, so that the factor is exact everywhere.

@@ -1,6 +1,6 @@
 //! Stage `broadphase/grid`: uniform grid. Host side of `shaders/broadphase/grid.wgsl`.
 
-use super::lbvh::{Tree, TreeOptions};
+use super::lbvh::{Scratch, Tree, TreeOptions};
 use super::{Choice, those_of};
 use crate::primitives::{Count, Scan, ScanOptions};
 use crate::store::Sizes;
@@ -18,7 +18,7 @@ pub(crate) struct Grid {
     pairs: Arc<Pass>,
     scan_cells: Scan,
     slices: Option<Slices>,
-    large: Option<Tree>,
+    large: Option<Large>,
     cells: wgpu::Buffer,
     cell_boxes: wgpu::Buffer,
     slice_bounds: wgpu::Buffer,
@@ -32,6 +32,12 @@ struct Slices {
     size: Arc<Pass>,
     scan: Scan,
     room: u32,
+}
+
+/// The tree of colliders larger than a cell.
+struct Large {
+    scratch: Scratch,
+    tree: Tree,
 }
 
 impl Grid {
@@ -50,16 +56,16 @@ impl Grid {
             _ => None,
         };
         let large = match choice.large_tree {
-            true => Some(Tree::new(
-                gpu,
-                pipelines,
-                &TreeOptions {
-                    capacity: sizes.colliders,
+            true => {
+                let options = TreeOptions {
+                    capacity: limits::large_limit(sizes.colliders, true),
                     members: tree_members::LARGE,
                     bits: MortonBits::Bits30,
                     traversal: choice.traversal,
-                },
-            )?),
+                };
+                let scratch = Scratch::new(gpu, pipelines, sizes.colliders, options.bits)?;
+                Some(Large { scratch, tree: Tree::new(gpu, pipelines, &options)? })
+            }
             false => None,
         };
         let room = slices.as_ref().map_or(0, |slices| slices.room);
@@ -85,7 +91,8 @@ impl Grid {
 
     pub(crate) fn bytes(&self) -> u64 {
         let own = [&self.cells, &self.cell_boxes, &self.slice_bounds, &self.slice_start];
-        own.iter().map(|buffer| buffer.size()).sum::<u64>() + self.large.as_ref().map_or(0, Tree::bytes)
+        own.iter().map(|buffer| buffer.size()).sum::<u64>()
+            + self.large.as_ref().map_or(0, |large| large.scratch.bytes() + large.tree.bytes())
     }
 
     /// Tells scans and sorts how long their arrays are in this step.
@@ -95,7 +102,10 @@ impl Grid {
             slices.scan.set_count(gpu, slices.room)?;
         }
         match &mut self.large {
-            Some(tree) => tree.prepare(gpu, step.collider_count),
+            Some(large) => {
+                large.tree.prepare(gpu, step.collider_count);
+                large.scratch.prepare(gpu, step.collider_count)
+            }
             None => Ok(()),
         }
     }
@@ -122,8 +132,8 @@ impl Grid {
         self.scan_cells.record(recorder, &self.cells, None)?;
         run(recorder, &self.scatter, colliders)?;
         run(recorder, &self.pairs, colliders)?;
-        if let Some(tree) = &self.large {
-            tree.record_build(recorder)?;
+        if let Some(Large { scratch, tree }) = &self.large {
+            tree.record_build(recorder, scratch)?;
             tree.record_refit(recorder)?;
             tree.record_pairs(recorder)?;
             tree.record_across(recorder)?;

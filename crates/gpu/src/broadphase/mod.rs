@@ -3,7 +3,7 @@
 
 mod brute_force;
 mod grid;
-mod lbvh;
+pub(crate) mod lbvh;
 mod sweep;
 
 use crate::primitives::{Count, Sort, SortOptions};
@@ -27,8 +27,8 @@ pub(crate) struct Choice {
     bits: MortonBits,
     /// Whether colliders larger than the grid's cells have a tree.
     pub(crate) large_tree: bool,
-    /// Whether bounded colliders of fixed bodies may occur.
-    fixed: bool,
+    /// Most bounded colliders of fixed bodies.
+    fixed: u32,
 }
 
 impl Choice {
