@@ -7,8 +7,7 @@ mod worlds;
 use tumble::World;
 use tumble_core::glam::{Quat, Vec3};
 use tumble_core::{
-    BodyHandle, Broadphase, ColliderBuilder, MortonBits, Params, Pose, RigidBodyBuilder, Scene, Spread, Traversal,
-    scenes,
+    BodyHandle, Broadphase, ColliderBuilder, MortonBits, Params, Pose, RigidBodyBuilder, Scene, Traversal, scenes,
 };
 use worlds::{SIDES, hash, report, steps};
 
@@ -97,11 +96,46 @@ fn changing_it_on_the_way_changes_nothing() {
             changing.set_params(Params { broadphase, traversal, morton_bits, ..Params::default() }).unwrap();
             steps(&mut steady, 4);
             steps(&mut changing, 4);
+            // What one of them does not hear of, the next one must.
+            for world in [&mut steady, &mut changing] {
+                let body = RigidBodyBuilder::dynamic().translation(Vec3::new(0.3, 8.0, 0.2));
+                world.edit().insert(body, ColliderBuilder::ball(0.3)).unwrap();
+                let first = world.scene().bodies().nth(30).unwrap();
+                world.edit().remove(first).unwrap();
+            }
+            steps(&mut steady, 1);
+            steps(&mut changing, 1);
             let report = report(&mut changing);
-            let expected = broadphase.resolve(&Spread::of(&scene));
+            let expected = broadphase.resolve(changing.edit().spread());
             assert_eq!(report.broadphase, expected, "{side:?}");
             assert!(report.broadphase_bytes > 0 || broadphase == Broadphase::BruteForce, "{side:?}: {report}");
             assert_eq!(hash(&mut steady), hash(&mut changing), "{side:?}, {broadphase}");
+        }
+    }
+}
+
+/// `Auto` goes by how far bodies lie apart as they move, and results do not show it. Oracle: the grid.
+#[test]
+fn auto_sees_that_bodies_fly_apart() {
+    for side in SIDES {
+        let mut scene = Scene::new();
+        scene.gravity = Vec3::ZERO;
+        for i in 0..15 * 15 * 15 {
+            let place = 0.11 * (Vec3::new((i % 15) as f32, (i / 15 % 15) as f32, (i / 225) as f32) - 7.0);
+            let body = RigidBodyBuilder::dynamic().translation(place).linvel(8.0 * place);
+            scene.insert(body, ColliderBuilder::ball(0.05));
+        }
+        let named = Params { broadphase: Broadphase::Grid, ..Params::default() };
+        let mut worlds = [Params::default(), named].map(|params| side.world(&scene, &params));
+        for (step, expected) in [(1, Broadphase::Grid), (63, Broadphase::Grid), (64, Broadphase::SweepAndPrune)] {
+            for world in &mut worlds {
+                let done = report(world).step;
+                steps(world, step - done as usize);
+            }
+            let [auto, named] = &mut worlds;
+            assert_eq!(report(auto).broadphase, expected, "{side:?}, step {step}");
+            assert_eq!(report(named).broadphase, Broadphase::Grid, "{side:?}");
+            assert_eq!(hash(auto), hash(named), "{side:?}, step {step}");
         }
     }
 }

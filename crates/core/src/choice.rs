@@ -6,7 +6,8 @@ use crate::scene::Scene;
 use crate::shape::Shape;
 use glam::Vec3;
 
-/// What the choice rests on: shapes, and places as they were at insertion. Half-spaces do not count.
+/// What the choice rests on: shapes, and how far apart they are, at insertion and as a world sees it from time to time.
+/// Half-spaces do not count.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Spread {
     /// All colliders.
@@ -15,10 +16,8 @@ pub struct Spread {
     pub colliders: u32,
     /// Size of the largest collider over that of the median one, when the few that a grid may leave out are left out.
     pub size_ratio: f32,
-    /// Longest axis of the scene over the second, both at least one median collider.
-    pub elongation: f32,
-    /// Cells of the median size in the box around all, for each collider.
-    pub sparsity: f32,
+    /// Mean size, m.
+    pub mean_size: f32,
     /// Colliders that begin within one mean size along the longest axis: what a sweep compares each with.
     pub abreast: f32,
 }
@@ -52,17 +51,21 @@ impl Spread {
         let mut nth = |n: usize| *sizes.select_nth_unstable_by(n, f32::total_cmp).1;
         let median = nth(count / 2).max(f32::MIN_POSITIVE);
         let largest = nth(count - 1 - (large_limit(count as u32, false) as usize).min(count - 1));
-        let cells = (extent.max(Vec3::ZERO) / median).max(Vec3::ONE);
-        let mut axes = cells.to_array();
-        axes.sort_by(f32::total_cmp);
         Self {
             all: count as u32,
             colliders: count as u32,
             size_ratio: largest / median,
-            elongation: axes[2] / axes[1],
-            sparsity: axes[0] * axes[1] * axes[2] / count as f32,
-            abreast: (count as f64 * mean / f64::from(extent.max_element().max(0.0)).max(mean)) as f32,
+            mean_size: mean as f32,
+            abreast: 0.0,
         }
+        .across(extent)
+    }
+
+    /// The same colliders, when their middles fill a box of this extent.
+    pub fn across(self, extent: Vec3) -> Self {
+        let longest = extent.max_element().max(self.mean_size);
+        let abreast = self.colliders as f32 * self.mean_size / longest.max(f32::MIN_POSITIVE);
+        Self { abreast, ..self }
     }
 
     /// Whether so many sizes differ so much that a grid needs a tree beside it.

@@ -72,7 +72,8 @@ impl Editor {
         Ok((editor, packed))
     }
 
-    /// What the choice of a broad phase rests on: looked at anew when the number of colliders has changed by a quarter.
+    /// What the choice of a broad phase rests on: looked at anew when the number of colliders has changed by a quarter, and
+    /// its extent every so often ([`LOOK_EVERY`](crate::limits::LOOK_EVERY)).
     pub fn spread(&self) -> &Spread {
         &self.spread
     }
@@ -80,6 +81,12 @@ impl Editor {
     /// The scene as edited so far. Poses and velocities in it are those at insertion.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Tells how far the middles of colliders lie apart now, as a world has seen it. Backends call it.
+    #[doc(hidden)]
+    pub fn look(&mut self, extent: Vec3) {
+        self.spread = self.spread.across(extent);
     }
 
     /// What the scene could need when edits were last taken.

@@ -22,6 +22,12 @@ pub const UNBOUNDED_LIMIT: u32 = 4096;
 /// Most slices of a sliced grid: their sizes are added up in two words.
 pub const SLICE_LIMIT: u32 = 65_536;
 
+/// Steps after which a world looks again how far its colliders lie apart, for the choice of a broad phase.
+pub const LOOK_EVERY: u32 = 64;
+
+/// Steps after which the status of a step has come back from a GPU: no decision looks at a later one.
+pub const STATUS_DELAY: u32 = 3;
+
 /// Candidates that one turn of work of the sweep looks at.
 pub const SWEEP_CHUNK: u32 = 256;
 

@@ -54,9 +54,10 @@ fn a_spread_is_what_it_says() {
         let place = Vec3::new(3.0 * (i % 10) as f32, 5.0, 3.0 * (i / 10) as f32);
         scene.insert(RigidBodyBuilder::dynamic().translation(place), ColliderBuilder::ball(0.5));
     }
-    let (sparsity, abreast) = (27.0 * 9.0 / 40.0, 40.0 / 27.0);
-    let spread = Spread { all: 41, colliders: 40, size_ratio: 1.0, elongation: 3.0, sparsity, abreast };
+    let spread = Spread { all: 41, colliders: 40, size_ratio: 1.0, mean_size: 1.0, abreast: 40.0 / 27.0 };
     assert_eq!(Spread::of(&scene), spread);
+    assert_eq!(spread.across(Vec3::new(2.0, 80.0, 3.0)), Spread { abreast: 0.5, ..spread });
+    assert_eq!(spread.across(-Vec3::INFINITY), Spread { abreast: 40.0, ..spread }, "all in one place");
     // Eight large ones are a few; a ninth is not.
     for i in 0..9 {
         assert_eq!(Spread::of(&scene).size_ratio, 1.0, "{i} large ones");

@@ -7,6 +7,7 @@ use crate::shared::Shared;
 use crate::solver::{self, Rows, prepare, store};
 use crate::{bounds, edit, motion, narrowphase, query};
 use bytemuck::Zeroable;
+use glam::Vec3;
 use rayon::prelude::*;
 use std::time::Instant;
 use tumble_core::edit::EditBatch;
@@ -30,6 +31,8 @@ pub struct World {
     growths: Vec<(&'static str, u32)>,
     drop_pair: u32,
     finder: Finder,
+    /// How far colliders lay apart in the step of this number.
+    extent: Option<(u32, Vec3)>,
     queries: query::Cached,
     /// Why the last step did not run.
     failed: Option<Error>,
@@ -122,6 +125,7 @@ impl World {
             growths: Vec::new(),
             drop_pair: u32::MAX,
             finder: Finder::default(),
+            extent: None,
             queries: query::Cached::default(),
             failed: None,
         })
@@ -175,8 +179,13 @@ impl World {
         let (room, grown) = self.room.grown(&needed, &self.params.capacities)?;
         self.room = room;
         grown.into_iter().for_each(|buffer| self.count_growth(buffer));
+        let number = self.kept.control.step + 1;
+        // As late as on a GPU.
+        if let Some((_, extent)) = self.extent.take_if(|(seen, _)| *seen + limits::STATUS_DELAY == number) {
+            self.editor.look(extent);
+        }
         let edits = self.editor.take();
-        let mut step = self.params.step_params(self.kept.control.step + 1, self.editor.scene().gravity);
+        let mut step = self.params.step_params(number, self.editor.scene().gravity);
         step.body_count = needed.bodies;
         step.collider_count = needed.colliders;
         step.edit_ranges = edits.ranges.len() as u32;
@@ -189,6 +198,9 @@ impl World {
             return Err(error);
         }
         self.drop_pair = u32::MAX;
+        if (step.step + limits::STATUS_DELAY).is_multiple_of(limits::LOOK_EVERY) {
+            self.extent = Some((step.step, self.finder.extent()));
+        }
         Ok(())
     }
 

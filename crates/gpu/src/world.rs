@@ -7,6 +7,7 @@ use crate::stages::{Built, Stages};
 use crate::store::{self, Sizes};
 use crate::{BindCache, Buffers, Gpu, Pipelines, Recorder, Timer};
 use bytemuck::Zeroable;
+use glam::Vec3;
 use std::collections::VecDeque;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{BodyState, Control, LAST_BATCH, PoseRecord, StepParams, overflow};
@@ -51,6 +52,8 @@ pub struct World {
     last: Control,
     /// Batches that were worth a dispatch in the step of this number, for the last few.
     batches: VecDeque<(u32, u32)>,
+    /// How far colliders lay apart in the step of this number.
+    extent: Option<(u32, Vec3)>,
     stage_times: Vec<StageTime>,
     growths: Vec<(&'static str, u32)>,
     drop_pair: u32,
@@ -119,6 +122,7 @@ impl World {
             submitted: 0,
             last: Control::zeroed(),
             batches: VecDeque::new(),
+            extent: None,
             stage_times: Vec::new(),
             growths: Vec::new(),
             drop_pair: u32::MAX,
@@ -196,6 +200,9 @@ impl World {
         self.take_statuses(IN_FLIGHT - 1)?;
         let (bodies, colliders) = (self.editor.body_slots() as u32, self.editor.collider_slots() as u32);
         self.make_room(Room { bodies, colliders, edits: self.editor.edit_count() as u32 })?;
+        if let Some((_, extent)) = self.extent.take_if(|(seen, _)| *seen + limits::STATUS_DELAY == self.submitted + 1) {
+            self.editor.look(extent);
+        }
         let edits = self.editor.take();
         let mut step = self.params.step_params(self.submitted + 1, self.editor.scene().gravity);
         step.body_count = bodies;
@@ -388,6 +395,9 @@ impl World {
                 continue;
             }
             if let Some(record) = self.flying.pop_front() {
+                if (status.step + limits::STATUS_DELAY).is_multiple_of(limits::LOOK_EVERY) {
+                    self.extent = Some((status.step, extent_of(&status)));
+                }
                 self.stages.broadphase.walked(record.step.step, status.turns);
                 self.batches.push_back((record.step.step, wide_batches(&status)));
                 if self.batches.len() > 2 * IN_FLIGHT {
@@ -503,6 +513,13 @@ fn wide_batches(status: &Control) -> u32 {
         status.batch_start[first + 1].saturating_sub(status.batch_start[first]) >= WIDE
     };
     (0..LAST_BATCH).rev().find(worth).map_or(0, |batch| batch + 1)
+}
+
+/// How far the middles of bounded colliders lay apart, m; below zero without any.
+fn extent_of(status: &Control) -> Vec3 {
+    // As shaders make an integer that rises with the float.
+    let float = |x: u32| f32::from_bits(if x >> 31 == 1 { x & 0x7fff_ffff } else { !x });
+    Vec3::from_array(status.center_max.map(float)) - Vec3::from_array(status.center_min.map(float))
 }
 
 /// The capacities that the user allows and the device has.

@@ -1,8 +1,10 @@
 //! Runs the broad phase that was asked for, and keeps what outlives a step: trees.
 
 use super::{Boxes, Found, brute_force, grid, lbvh, sweep};
+use glam::Vec3;
 use tumble_core::edit::Stale;
 use tumble_core::layout::{StepParams, tree_members};
+use tumble_core::limits::STATUS_DELAY;
 use tumble_core::wear::Wear;
 use tumble_core::{Broadphase, MortonBits, Params, Traversal};
 
@@ -15,6 +17,8 @@ pub(crate) struct Finder {
     /// What the trees were made for, and the margins of the fixed one's boxes.
     made_for: Option<(MortonBits, Traversal, [u32; 2])>,
     bytes: u64,
+    /// How far the middles of bounded colliders lay apart in the last step, m; below zero without any.
+    extent: Vec3,
 }
 
 /// What it is to look for, and how.
@@ -30,6 +34,11 @@ impl Finder {
     pub(crate) fn find(&mut self, boxes: &Boxes, search: &Search) -> Found {
         let Search { step, params, broadphase, .. } = *search;
         let most = step.pair_capacity;
+        self.extent = Vec3::from_array(boxes.high) - Vec3::from_array(boxes.low);
+        if broadphase != Broadphase::Lbvh {
+            // Trees that are not kept up to date hear of no edits.
+            self.made_for = None;
+        }
         match broadphase {
             Broadphase::BruteForce => {
                 self.bytes = 0;
@@ -67,6 +76,11 @@ impl Finder {
         self.bytes
     }
 
+    /// How far the middles of bounded colliders lay apart in the last step, m.
+    pub(crate) fn extent(&self) -> Vec3 {
+        self.extent
+    }
+
     /// Brings the trees up to the step: new where they must be, refitted where they may.
     fn refresh(&mut self, boxes: &Boxes, search: &Search) {
         let Search { step, params, stale, .. } = *search;
@@ -74,19 +88,23 @@ impl Finder {
         let made_for = Some((params.morton_bits, params.traversal, margins));
         let other = self.made_for != made_for;
         self.made_for = made_for;
+        let history = params.traversal == Traversal::History;
+        let build = |members| {
+            let mut tree = lbvh::Tree::new(boxes, params.morton_bits, members);
+            if history {
+                tree.link_parents();
+            }
+            tree
+        };
         if other || stale.fixed {
-            self.fixed = lbvh::Tree::new(boxes, params.morton_bits, tree_members::FIXED);
+            self.fixed = build(tree_members::FIXED);
         }
-        let due = self.wear.is_due(step.step - 1, self.moving.count());
-        if other || stale.moving || due {
-            self.moving = lbvh::Tree::new(boxes, params.morton_bits, tree_members::MOVING);
+        let until = step.step.saturating_sub(STATUS_DELAY);
+        if other || stale.moving || self.wear.is_due(until, self.moving.count()) {
+            self.moving = build(tree_members::MOVING);
             self.wear.built(step.step);
         } else {
             self.moving.refit(boxes);
-        }
-        if params.traversal == Traversal::History {
-            self.fixed.link_parents();
-            self.moving.link_parents();
         }
     }
 }

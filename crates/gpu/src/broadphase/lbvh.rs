@@ -7,12 +7,11 @@ use crate::{Bind, Gpu, Pass, Pipelines, Recorder};
 use std::sync::Arc;
 use tumble_core::edit::Stale;
 use tumble_core::layout::{StepParams, TreeInfo, TreeNode, tree_members};
+use tumble_core::limits::STATUS_DELAY;
 use tumble_core::wear::Wear;
 use tumble_core::{MortonBits, Result, Traversal};
 use wgpu::BufferUsages;
 
-/// Steps after which a status has come back: no decision looks at a later one.
-const STATUS_DELAY: u32 = 3;
 /// Levels of the pyramid that one dispatch makes.
 const LEVELS: u32 = 8;
 
