@@ -92,14 +92,19 @@ fn changing_it_on_the_way_changes_nothing() {
         let scene = boulders(100);
         let mut steady = side.world(&scene, &Params::default());
         let mut changing = side.world(&scene, &Params::default());
-        for (broadphase, traversal, morton_bits) in EVERY {
+        // A tree that rests while edits go by, too.
+        let there_and_back = [EVERY[5], EVERY[2], EVERY[5]];
+        for (broadphase, traversal, morton_bits) in EVERY.into_iter().chain(there_and_back) {
             changing.set_params(Params { broadphase, traversal, morton_bits, ..Params::default() }).unwrap();
             steps(&mut steady, 4);
             steps(&mut changing, 4);
             // What one of them does not hear of, the next one must.
             for world in [&mut steady, &mut changing] {
-                let body = RigidBodyBuilder::dynamic().translation(Vec3::new(0.3, 8.0, 0.2));
-                world.edit().insert(body, ColliderBuilder::ball(0.3)).unwrap();
+                // More than slots that became free.
+                for height in [8.0, 8.3, 8.6] {
+                    let body = RigidBodyBuilder::dynamic().translation(Vec3::new(0.3, height, 0.2));
+                    world.edit().insert(body, ColliderBuilder::ball(0.3)).unwrap();
+                }
                 let first = world.scene().bodies().nth(30).unwrap();
                 world.edit().remove(first).unwrap();
             }
@@ -176,6 +181,7 @@ fn a_worn_tree_is_built_anew() {
             (least, most) = (least.min(ratio), most.max(ratio));
         }
         println!("{side:?}: {least:.2} to {most:.2} times the turns of a fresh tree");
-        assert!(most < 3.0, "{side:?}: {most}");
+        // 1.57 when it was written; 3.3 for a tree that is only refitted.
+        assert!(most < 2.0, "{side:?}: {most}");
     }
 }
