@@ -31,6 +31,11 @@ for bench in "$folder"/benches/*; do
     [ -e "benches/$name.rs" ] || [ -e "benches/$name/main.rs" ] || rm "$bench"
 done
 
+# What debuggers want is most of their size.
+if command -v strip >/dev/null; then
+    strip --strip-debug "$folder"/tests/* "$folder"/benches/*
+fi
+
 cat >"$folder/run.sh" <<'RUN'
 #!/usr/bin/env bash
 # Runs what is packed here: every test, then every bench; tables and pictures go to RESULTS (at first: results).

@@ -326,12 +326,10 @@ fn csv(fresh: &[Row], steady: &[Row], choices: &[Choice]) -> String {
             );
         }
     }
-    text += "\nrule,crowd,bodies,auto,best,over_best,size_ratio,elongation,sparsity\n";
+    text += "\nrule,crowd,bodies,auto,best,over_best,size_ratio,abreast\n";
     for Choice { crowd, count, auto, best, regret, spread } in choices {
-        let Spread { size_ratio, elongation, sparsity, .. } = spread;
-        text += &format!(
-            "rule,{crowd},{count},\"{auto}\",\"{best}\",{regret:.3},{size_ratio:.2},{elongation:.2},{sparsity:.2}\n"
-        );
+        let Spread { size_ratio, abreast, .. } = spread;
+        text += &format!("rule,{crowd},{count},\"{auto}\",\"{best}\",{regret:.3},{size_ratio:.2},{abreast:.1}\n");
     }
     text
 }
