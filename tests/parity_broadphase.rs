@@ -217,20 +217,20 @@ impl TreeOf {
         let [keys, members] = ["keys", "members"].map(|name| alone.buffers.buffer(name).unwrap().clone());
         let by_slot = groups(self.count);
         alone.run(|chain| {
-            chain.pass("broadphase/lbvh", "codes", by_slot);
+            chain.pass("broadphase/lbvh/build", "codes", by_slot);
             sort.record(&mut chain.recorder, &keys, &members, None).unwrap();
-            chain.pass("broadphase/lbvh", "hierarchy", by_slot);
-            chain.pass("broadphase/lbvh", "parents", by_slot);
+            chain.pass("broadphase/lbvh/build", "hierarchy", by_slot);
+            chain.pass("broadphase/lbvh/build", "parents", by_slot);
         });
     }
 
     fn refit(&self, alone: &mut Alone) {
         alone.run(|chain: &mut Chain| {
-            chain.pass("broadphase/lbvh", "leaves", groups(self.count));
+            chain.pass("broadphase/lbvh/build", "leaves", groups(self.count));
             for level in [8, 16] {
-                chain.indexed("broadphase/lbvh", "pyramid_up", ("level", level), groups(self.count >> level));
+                chain.indexed("broadphase/lbvh/build", "pyramid_up", ("level", level), groups(self.count >> level));
             }
-            chain.pass("broadphase/lbvh", "boxes", groups(self.count));
+            chain.pass("broadphase/lbvh/build", "boxes", groups(self.count));
         });
     }
 }
@@ -297,13 +297,13 @@ fn trees_and_their_pairs_are_the_same() {
                     let groups = groups(aabbs.len());
                     let [moving, fixed] = &mut *alones;
                     prepare(moving, &boxes, &step, &Control::zeroed());
-                    moving.run(|chain| chain.pass("broadphase/lbvh", pairs, groups));
+                    moving.run(|chain| chain.pass("broadphase/lbvh/walk", pairs, groups));
                     // What the first tree found goes on in the second one's buffers.
                     let (control, keys) = (moving.take::<Control>("counters")[0], moving.take::<u32>("pair_keys"));
                     prepare(fixed, &boxes, &step, &Control::zeroed());
                     fixed.put("counters", &[control]);
                     fixed.put("pair_keys", &keys);
-                    fixed.run(|chain| chain.pass("broadphase/lbvh", across, groups));
+                    fixed.run(|chain| chain.pass("broadphase/lbvh/walk", across, groups));
                     let control = finish(fixed, &step);
                     check_pairs(fixed, &control, &expected.pairs, &what);
                     assert_eq!(control.turns, found.turns, "{what}");
@@ -349,8 +349,8 @@ fn a_tree_of_the_large_ones_goes_with_a_grid() {
             tree.build(alone);
             tree.refit(alone);
             alone.run(|chain| {
-                chain.pass("broadphase/lbvh", pairs, groups(aabbs.len()));
-                chain.pass("broadphase/lbvh", across, groups(aabbs.len()));
+                chain.pass("broadphase/lbvh/walk", pairs, groups(aabbs.len()));
+                chain.pass("broadphase/lbvh/walk", across, groups(aabbs.len()));
             });
             let control = finish(alone, &step);
             check_pairs(alone, &control, &expected.pairs, &what);
@@ -426,7 +426,7 @@ fn long_searches_are_not_cut_short() {
         prepare(&mut alone, &boxes, &step, &Control::zeroed());
         tree.build(&mut alone);
         tree.refit(&mut alone);
-        alone.run(|chain| chain.pass("broadphase/lbvh", pairs, groups(count)));
+        alone.run(|chain| chain.pass("broadphase/lbvh/walk", pairs, groups(count)));
         let control = finish(&mut alone, &step);
         check_pairs(&alone, &control, &found.pairs, &format!("{traversal:?}"));
         assert_eq!(control.turns, found.turns, "{traversal:?}");

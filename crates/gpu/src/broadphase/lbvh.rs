@@ -1,4 +1,4 @@
-//! Stage `broadphase/lbvh`: linear bounding volume hierarchy. Host side of `shaders/broadphase/lbvh.wgsl`.
+//! Stage `broadphase/lbvh`: linear bounding volume hierarchy. Host side of `shaders/broadphase/lbvh/*.wgsl`.
 
 use super::{Choice, those_of};
 use crate::primitives::{Count, Sort, SortOptions};
@@ -156,13 +156,14 @@ pub(crate) struct Tree {
 
 impl Tree {
     pub(crate) fn new(gpu: &Gpu, pipelines: &mut Pipelines, options: &TreeOptions) -> Result<Self> {
-        let mut pass = |entry| pipelines.pass(gpu, "broadphase/lbvh", entry);
+        let mut pass = |entry| pipelines.pass(gpu, "broadphase/lbvh/walk", entry);
         let history = options.traversal == Traversal::History;
         let (pairs, across) = match options.traversal {
             Traversal::History => (pass("pairs_by_history")?, pass("across_by_history")?),
             Traversal::Stack => (pass("pairs_with_stack")?, pass("across_with_stack")?),
             _ => (pass("pairs_by_escapes")?, pass("across_by_escapes")?),
         };
+        let mut pass = |entry| pipelines.pass(gpu, "broadphase/lbvh/build", entry);
         let [codes, hierarchy, leaves] = [pass("codes")?, pass("hierarchy")?, pass("leaves")?];
         let [pyramid_up, boxes] = [pass("pyramid_up")?, pass("boxes")?];
         let parents = if history { Some(pass("parents")?) } else { None };
