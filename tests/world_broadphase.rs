@@ -6,6 +6,8 @@ mod worlds;
 
 use tumble::World;
 use tumble_core::glam::{Quat, Vec3};
+use tumble_core::scenes::Crowd;
+use tumble_core::validate;
 use tumble_core::{
     BodyHandle, Broadphase, ColliderBuilder, MortonBits, Params, Pose, RigidBodyBuilder, Scene, Traversal, scenes,
 };
@@ -82,6 +84,31 @@ fn every_broad_phase_gives_the_same_bits() {
                 assert_eq!(hash, *first.get_or_insert(hash), "{what}");
             }
         }
+    }
+}
+
+/// Oracle: brute force on the same side, over the same boxes.
+#[test]
+fn twenty_thousand_on_the_gpu() {
+    const EACH: [Broadphase; 4] =
+        [Broadphase::Grid, Broadphase::SlicedGrid, Broadphase::Lbvh, Broadphase::SweepAndPrune];
+    // All in one place they would be 2e8 pairs.
+    for kind in Crowd::ALL.into_iter().filter(|kind| !matches!(kind, Crowd::OnePoint | Crowd::Liu)) {
+        let scene = scenes::crowd(kind, 20_000);
+        let pairs = |broadphase| {
+            let params = Params { broadphase, ..Params::default() };
+            let mut world = tumble_gpu::World::with_gpu(common::gpu().clone(), scene.clone(), params).unwrap();
+            world.step().unwrap();
+            let report = world.sync().unwrap();
+            assert_eq!((report.broadphase, report.step, report.lost), (broadphase, 1, 0), "{kind}");
+            let pairs = world.pairs().unwrap();
+            assert_eq!(pairs.len(), report.pairs as usize, "{kind}: {broadphase}");
+            validate::pairs(&pairs).unwrap();
+            pairs
+        };
+        let expected = pairs(Broadphase::BruteForce);
+        assert!(expected.len() > 20_000, "{kind}: {}", expected.len());
+        EACH.into_iter().for_each(|broadphase| assert!(pairs(broadphase) == expected, "{kind}: {broadphase}"));
     }
 }
 

@@ -10,7 +10,7 @@ use bytemuck::Zeroable;
 use glam::Vec3;
 use std::collections::VecDeque;
 use tumble_core::edit::EditBatch;
-use tumble_core::layout::{BodyState, Control, LAST_BATCH, PoseRecord, StepParams, overflow};
+use tumble_core::layout::{BodyState, Control, LAST_BATCH, Pair, PoseRecord, StepParams, overflow};
 use tumble_core::limits::{self, Room};
 use tumble_core::{Capacities, Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
 use tumble_core::{Nearest, NearestQuery, OverlapShape, Overlaps, Ray, RayHit};
@@ -181,6 +181,18 @@ impl World {
     /// None that a user can cause.
     pub fn pose_buffer(&self) -> Result<(&wgpu::Buffer, u64)> {
         Ok((self.buffers.buffer("poses")?, self.buffers.generation_of("poses")))
+    }
+
+    /// Test hook: colliders of the pairs of the last step, once it has run.
+    #[doc(hidden)]
+    pub fn pairs(&mut self) -> Result<Vec<[u32; 2]>> {
+        self.take_statuses(0)?;
+        let bytes = u64::from(self.last.old_pair_count) * size_of::<Pair>() as u64;
+        let pairs = match bytes {
+            0 => Vec::new(),
+            _ => read_now(&self.gpu, self.buffers.buffer("pairs")?, 0, bytes)?,
+        };
+        Ok(bytemuck::pod_collect_to_vec::<u8, Pair>(&pairs).iter().map(|pair| [pair.a, pair.b]).collect())
     }
 
     /// Test hook: the next step leaves out the pair of this index.
