@@ -79,13 +79,13 @@ const FEW: u32 = 128;
 /// Up to so many colliders abreast, a sweep is faster than a grid.
 const ABREAST: f32 = 200.0;
 /// The same where a grid has no say, and a tree is slower.
-const ABREAST_OF_TREE: f32 = 800.0;
+const ABREAST_OF_TREE: f32 = 400.0;
 
 impl Broadphase {
     /// What `Auto` stands for in a scene like this; anything else stands for itself.
     ///
     /// The rule, measured on the CPU (`docs/broadphase.md`): up to 128 colliders each is tested against all. Else a sweep, as
-    /// long as few lie abreast along the longest axis: 200, or 800 where sizes differ more than fourfold. Beyond, a tree where
+    /// long as few lie abreast along the longest axis: 200, or 400 where sizes differ more than fourfold. Beyond, a tree where
     /// sizes differ so, and a grid where they do not.
     pub fn resolve(self, spread: &Spread) -> Self {
         match (self, spread.is_wide()) {

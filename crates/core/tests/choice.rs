@@ -85,11 +85,11 @@ fn bounds_of_the_rule() {
         [spread(128, 1.0, 1e4), spread(129, 1.0, 1e4)].map(auto),
         [Broadphase::BruteForce, Broadphase::SweepAndPrune]
     );
-    // 200 abreast, and a few more; with a mean size of 2 m, 800.
+    // 200 abreast, and a few more; with a mean size of 2 m, 400.
     let sizes = [spread(2000, 1.0, 10.0), spread(2000, 1.0, 9.9)];
     assert_eq!(sizes.map(|s| s.abreast.round()), [200.0, 202.0]);
     assert_eq!(sizes.map(auto), [Broadphase::SweepAndPrune, Broadphase::Grid]);
-    let wide = [spread(2000, 11.0, 5.0), spread(2000, 11.0, 4.9)];
-    assert_eq!(wide.map(|s| s.abreast.round()), [800.0, 816.0]);
+    let wide = [spread(2000, 11.0, 10.0), spread(2000, 11.0, 9.9)];
+    assert_eq!(wide.map(|s| s.abreast.round()), [400.0, 404.0]);
     assert_eq!(wide.map(auto), [Broadphase::SweepAndPrune, Broadphase::Lbvh]);
 }

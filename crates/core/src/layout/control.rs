@@ -96,6 +96,6 @@ pub struct Control {
     pub batch_start: [u32; 68],
     /// Slots of bodies newly quarantined in this step, plus one; zero where there is none.
     pub quarantined: [u32; QUARANTINE_NAMES],
-    /// Unused.
+    /// What passes of one step tell each other, see `contact.wgsl` and `broadphase/grid.wgsl`.
     pub pad_b: [u32; 4],
 }
