@@ -360,10 +360,12 @@ impl World {
 
     /// Records and submits one step, and its status behind it.
     fn submit(&mut self, mut record: Record) -> Result<()> {
-        let widened = self.built.plan.widen(&record.wants.plan);
-        if widened || self.built.choice != record.wants.choice {
-            self.built.choice = record.wants.choice;
-            self.stages = Stages::new(&self.gpu, &mut self.pipelines, &self.sizes, &self.built)?;
+        let mut wanted = self.built;
+        let widened = wanted.plan.widen(&record.wants.plan);
+        if widened || wanted.choice != record.wants.choice {
+            wanted.choice = record.wants.choice;
+            self.stages = Stages::new(&self.gpu, &mut self.pipelines, &self.sizes, &wanted)?;
+            self.built = wanted;
         }
         let step = &mut record.step;
         step.pair_capacity = self.sizes.pairs;
