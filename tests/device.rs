@@ -2,16 +2,19 @@
 //! when a device fails. Oracle: the words that were written.
 
 mod common;
+#[path = "common/words.rs"]
+mod words;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use common::{download, gpu, run, upload};
+use common::gpu;
 use tumble_core::Error;
 use tumble_gpu::primitives::{Count, Scan, ScanOptions};
 use tumble_gpu::readback::read_now;
 use tumble_gpu::{Bind, BindCache, Buffers, Gpu, Pipelines, Readback, Recorder, Timer};
 use wgpu::{BufferUsages, DeviceType};
+use words::{download, run, upload};
 
 #[test]
 fn software_is_no_hardware() {

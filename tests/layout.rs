@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use bytemuck::Zeroable;
 use naga::{Expression, Handle, Literal, Module, ScalarKind, Type, TypeInner};
 use tumble_core::layout::*;
+use tumble_core::limits;
 
 /// The files of `shaders/shared` that hold what the host holds too; the others are helpers of shaders.
 const LAYOUTS: &[&str] = &[
@@ -231,6 +232,20 @@ fn constants_agree() {
     }
     let missing: Vec<_> = expected.keys().filter(|name| !wgsl.contains_key(*name)).collect();
     assert!(missing.is_empty(), "not in WGSL: {missing:?}");
+}
+
+/// Bounds that both sides share. Oracle: the host's.
+#[test]
+fn limits_agree() {
+    let composed = tumble_shaders::compose("shared/limits").unwrap();
+    let module = naga::front::wgsl::parse_str(&composed.source).unwrap();
+    let expected = [
+        ("TURN_LIMIT", limits::TURN_LIMIT),
+        ("UNBOUNDED_LIMIT", limits::UNBOUNDED_LIMIT),
+        ("SWEEP_CHUNK", limits::SWEEP_CHUNK),
+        ("SWEEP_ITEM_LIMIT", limits::SWEEP_ITEM_LIMIT),
+    ];
+    assert_eq!(wgsl_constants(&module), expected.map(|(name, value)| (name.to_owned(), value)));
 }
 
 /// The two tables above are written by hand: every public struct and constant of the layout files is in them.

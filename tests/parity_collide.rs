@@ -8,10 +8,12 @@
 #[path = "common/alone.rs"]
 mod alone;
 mod common;
+#[expect(dead_code, reason = "only what bounds leaves is looked at")]
 #[path = "common/crowds.rs"]
 mod crowds;
 #[path = "common/floats.rs"]
 mod floats;
+#[expect(dead_code, reason = "a part of a frame is enough here")]
 #[path = "common/frame.rs"]
 mod frame;
 #[path = "common/random.rs"]

@@ -2,6 +2,7 @@
 //! committed states. Oracles are named with each test; parry's are in `queries`.
 
 mod common;
+#[expect(dead_code, reason = "only its shapes are asked for")]
 #[path = "common/parry.rs"]
 mod parry;
 #[path = "common/queries.rs"]

@@ -8,6 +8,7 @@ mod alone;
 mod common;
 #[path = "common/floats.rs"]
 mod floats;
+#[expect(dead_code, reason = "a part of a frame is enough here")]
 #[path = "common/frame.rs"]
 mod frame;
 #[path = "common/stage.rs"]

@@ -2,8 +2,10 @@
 //! give, in every order of invocations; and the parallel sort on the CPU. Oracles: the mirror, the standard library.
 
 mod common;
+#[path = "common/words.rs"]
+mod words;
 
-use common::{download, gpu, run, upload};
+use common::gpu;
 use tumble_core::Error;
 use tumble_cpu::primitives::{compact, exclusive_scan, radix_sort, radix_sort_by};
 use tumble_gpu::pipelines::build_pass;
@@ -11,6 +13,7 @@ use tumble_gpu::primitives::{
     Args, Compact, CompactOptions, Count, Job, Ranking, Scan, ScanOptions, Sort, SortOptions,
 };
 use tumble_gpu::{Bind, BindCache, Buffers, Gpu, Pipelines, Recorder, Shader, recorder};
+use words::{download, run, upload};
 
 const SIZES: &[u32] = &[0, 1, 2, 255, 256, 257, 2047, 2048, 2049, 3000, 65_535, 65_536, 65_537, 300_000];
 const PERMUTATIONS: [u32; 3] = [0, 1, 2];

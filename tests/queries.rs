@@ -4,6 +4,7 @@
 mod common;
 #[path = "common/parry.rs"]
 mod parry;
+#[expect(dead_code, reason = "it asks its own questions")]
 #[path = "common/queries.rs"]
 mod queries;
 #[path = "common/random.rs"]

@@ -2,8 +2,10 @@
 //! loops. Oracle: analysis, but where a test names another.
 
 mod common;
+#[expect(dead_code, reason = "only its shapes and casts are asked for")]
 #[path = "common/parry.rs"]
 mod parry;
+#[expect(dead_code, reason = "it asks its own questions")]
 #[path = "common/queries.rs"]
 mod queries;
 #[path = "common/random.rs"]

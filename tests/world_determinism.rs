@@ -2,6 +2,7 @@
 //! invocations, and with the solver's constraints four at a time or one after the other.
 
 mod common;
+#[expect(dead_code, reason = "a part of a frame is enough here")]
 #[path = "common/frame.rs"]
 mod frame;
 #[path = "common/worlds.rs"]

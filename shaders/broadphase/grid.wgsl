@@ -25,8 +25,6 @@
 //#import shared/thread.wgsl
 //#import shared/workgroup.wgsl
 
-// Most slices: their sizes are added up in two words.
-const SLICE_LIMIT: u32 = 65536u;
 // Words of counters: the sums of the upper and the lower part of the slices' sizes.
 const SLICE_UPPER: u32 = 109u;
 const SLICE_LOWER: u32 = 110u;

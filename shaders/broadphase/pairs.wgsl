@@ -3,10 +3,9 @@
 //   gate  one invocation: raises the stop flag when a bound was passed; no pairs then. Reads and writes counters.
 
 //#import shared/control.wgsl
+//#import shared/limits.wgsl
 //#import shared/step.wgsl
 //#import shared/thread.wgsl
-
-const UNBOUNDED_LIMIT: u32 = 4096u;
 
 @group(0) @binding(0) var<uniform> step: StepParams;
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;

@@ -23,8 +23,6 @@
 //#import shared/thread.wgsl
 //#import shared/workgroup.wgsl
 
-const SWEEP_CHUNK: u32 = 256u;
-const SWEEP_ITEM_LIMIT: u32 = 268435456u;
 const MOST_PER_DIMENSION: u32 = 65535u;
 const BLOCK: u32 = 32u; // candidates that are compared before any is tried
 const NOWHERE: u32 = 0xffffffffu; // key of a collider that takes no part

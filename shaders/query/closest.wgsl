@@ -12,6 +12,7 @@
 // Boxes by slabs: Kay and Kajiya, "Ray Tracing Complex Scenes" (SIGGRAPH 1986).
 
 //#import shared/cast.wgsl
+//#import shared/limits.wgsl
 //#import shared/math.wgsl
 //#import shared/project.wgsl
 //#import shared/query.wgsl
@@ -20,12 +21,6 @@
 
 // Nodes kept for later, and one more; where there is no room for one, its subtree is walked by escapes at once.
 const STACK: u32 = 32u;
-
-// Most turns of one walk: with UNBOUNDED_LIMIT below what every driver allows the loops of one invocation.
-const TURN_LIMIT: u32 = 50000u;
-
-// Most colliders without end.
-const UNBOUNDED_LIMIT: u32 = 4096u;
 
 // What an invocation looks for.
 const RAY: u32 = 0u;

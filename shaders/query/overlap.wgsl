@@ -11,6 +11,7 @@
 // edges of Ericson, "Real-Time Collision Detection" (2005), 4.4.1.
 
 //#import shared/collider.wgsl
+//#import shared/limits.wgsl
 //#import shared/math.wgsl
 //#import shared/query.wgsl
 //#import shared/thread.wgsl
@@ -18,12 +19,6 @@
 
 // Added to the cosines between the axes of two boxes.
 const PARALLEL: f32 = 1e-6;
-
-// Most turns of one walk: with UNBOUNDED_LIMIT below what every driver allows the loops of one invocation.
-const TURN_LIMIT: u32 = 50000u;
-
-// Most colliders without end.
-const UNBOUNDED_LIMIT: u32 = 4096u;
 
 @group(0) @binding(0) var<uniform> query_info: QueryInfo;
 @group(0) @binding(1) var<storage, read> volumes: array<QueryVolume>;

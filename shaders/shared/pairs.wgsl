@@ -6,10 +6,9 @@
 
 //#import shared/aabb.wgsl
 //#import shared/control.wgsl
+//#import shared/limits.wgsl
 //#import shared/step.wgsl
 
-const TURN_LIMIT: u32 = 50000u; // turns of one invocation's search
-const UNBOUNDED_LIMIT: u32 = 4096u; // and of each of its two walks along large_list
 const MOST_COUNTED: u32 = 0x80000000u; // the count stops before it wraps
 
 @group(0) @binding(0) var<uniform> step: StepParams;

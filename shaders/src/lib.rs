@@ -42,6 +42,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/couple", include_str!("../shared/couple.wgsl")),
     ("shared/edit", include_str!("../shared/edit.wgsl")),
     ("shared/graph", include_str!("../shared/graph.wgsl")),
+    ("shared/limits", include_str!("../shared/limits.wgsl")),
     ("shared/manifold", include_str!("../shared/manifold.wgsl")),
     ("shared/math", include_str!("../shared/math.wgsl")),
     ("shared/narrowphase", include_str!("../shared/narrowphase.wgsl")),

@@ -1,5 +1,4 @@
 //! The boxes of a scene's colliders, as it stands and as its bodies fly on.
-#![allow(dead_code, reason = "each program uses a part")]
 
 use tumble_core::layout::{Aabb, BodyProps, BodyState, Collider, StepParams};
 use tumble_core::{PackedScene, Params, Scene, limits};

@@ -1,5 +1,4 @@
 //! Boxes that broad phases find hard.
-#![allow(dead_code, reason = "each test program uses a part")]
 
 use tumble_core::glam::Vec3;
 use tumble_core::layout::*;

@@ -1,5 +1,4 @@
 //! One step on the CPU, pass by pass, so that a test can take what any pass reads and what it should write.
-#![allow(dead_code, reason = "each test program uses a part")]
 
 use std::iter;
 

@@ -1,5 +1,4 @@
 //! Queries answered by parry 0.31, over the colliders of a world where its poses say that they are.
-#![allow(dead_code, reason = "each test program uses a part")]
 
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::Pose as ParryPose;

@@ -1,5 +1,4 @@
 //! Scenes to ask about, and questions.
-#![allow(dead_code, reason = "each test program uses a part")]
 
 use tumble::World;
 use tumble_core::glam::{Quat, Vec3};

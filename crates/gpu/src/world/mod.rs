@@ -1,19 +1,22 @@
-//! A world on the GPU: submission, the ring of statuses, growth and the edit log.
+//! A world on the GPU: submission, the ring of statuses and the edit log. What grows is in `growth`.
+
+mod growth;
+mod queries;
 
 use crate::broadphase::Choice;
-use crate::query::{Asker, Query};
+use crate::query::Query;
 use crate::readback::{Readback, read_now};
 use crate::stages::{Built, Stages};
 use crate::store::{self, Sizes};
 use crate::{BindCache, Buffers, Gpu, Pipelines, Recorder, Timer};
 use bytemuck::Zeroable;
 use glam::Vec3;
+use growth::within;
 use std::collections::VecDeque;
 use tumble_core::edit::EditBatch;
-use tumble_core::layout::{BodyState, Control, LAST_BATCH, Pair, PoseRecord, StepParams, overflow};
+use tumble_core::layout::{BodyState, Control, LAST_BATCH, Pair, PoseRecord, StepParams};
 use tumble_core::limits::{self, Room};
-use tumble_core::{Capacities, Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
-use tumble_core::{Nearest, NearestQuery, OverlapShape, Overlaps, Ray, RayHit};
+use tumble_core::{Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
 
 /// Steps in flight before `step` waits.
 const IN_FLIGHT: usize = 3;
@@ -290,56 +293,6 @@ impl World {
         Ok(Velocities::from_states(self.last.step.into(), &bytemuck::pod_collect_to_vec::<u8, BodyState>(&bytes)))
     }
 
-    /// Waits for all submitted steps; the first collider that each ray meets, or none, in the order of the rays.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] names the ray and the field. [`Error::Capacity`] when a ray meets more nodes of the tree than a
-    /// loop may. As for [`World::step`].
-    pub fn cast_rays(&mut self, rays: &[Ray]) -> Result<Vec<Option<RayHit>>> {
-        self.asker()?.cast_rays(rays)
-    }
-
-    /// Waits for all submitted steps; whether each ray meets any collider. Cheaper than [`World::cast_rays`].
-    ///
-    /// # Errors
-    /// As for [`World::cast_rays`].
-    pub fn cast_rays_any(&mut self, rays: &[Ray]) -> Result<Vec<bool>> {
-        self.asker()?.cast_rays_any(rays)
-    }
-
-    /// Waits for all submitted steps; the colliders that each shape overlaps.
-    ///
-    /// # Errors
-    /// As for [`World::cast_rays`].
-    pub fn overlaps(&mut self, shapes: &[OverlapShape]) -> Result<Overlaps> {
-        self.asker()?.overlaps(shapes)
-    }
-
-    /// Waits for all submitted steps; the collider nearest to each point, or none.
-    ///
-    /// # Errors
-    /// As for [`World::cast_rays`].
-    pub fn nearest(&mut self, points: &[NearestQuery]) -> Result<Vec<Option<Nearest>>> {
-        self.asker()?.nearest(points)
-    }
-
-    /// Readies queries about the state after all submitted steps.
-    fn asker(&mut self) -> Result<Asker<'_>> {
-        self.run_waiting()?;
-        self.take_statuses(0)?;
-        let room = self.sizes.colliders;
-        // Slots of edits that no step has taken are empty.
-        let colliders = room.min(self.editor.collider_slots() as u32);
-        let query = match self.query.take() {
-            Some(query) if query.fits(room) => query,
-            _ => Query::new(&self.gpu, &mut self.pipelines, room, self.params.morton_bits)?,
-        };
-        let query = self.query.insert(query);
-        let (gpu, pipelines) = (&self.gpu, &mut self.pipelines);
-        query.refresh(gpu, pipelines, &self.buffers, self.submitted, colliders)?;
-        Ok(Asker { gpu, pipelines, query, editor: &self.editor })
-    }
-
     fn poses_of(&self, step: u32, bytes: &[u8]) -> Poses {
         Poses::from_records(step.into(), &bytemuck::pod_collect_to_vec::<u8, PoseRecord>(bytes))
     }
@@ -427,97 +380,6 @@ impl World {
         }
         self.gpu.check()
     }
-
-    /// A step raised the flag: it and all behind it must run again, in a larger buffer.
-    fn stopped(&mut self, status: Control) -> Result<()> {
-        while self.statuses.in_flight() > 0 {
-            self.statuses.wait_take(&self.gpu)?;
-        }
-        self.waiting.append(&mut self.flying);
-        self.last = Control { stop: status.stop, overflow: status.overflow, needed: status.needed, ..self.last };
-        self.run_waiting()
-    }
-
-    /// Makes the room that the first waiting step needs, and submits all that wait.
-    fn run_waiting(&mut self) -> Result<()> {
-        if self.waiting.is_empty() {
-            return Ok(());
-        }
-        self.grow_pairs()?;
-        while let Some(record) = self.waiting.pop_front() {
-            self.submit(record)?;
-        }
-        Ok(())
-    }
-
-    fn grow_pairs(&mut self) -> Result<()> {
-        let needed = u64::from(self.last.needed);
-        let (buffer, capacity) = match self.last.overflow {
-            overflow::PAIRS => ("pairs", self.sizes.pairs),
-            overflow::LAST_BATCH => ("last batch", limits::LAST_LIMIT),
-            overflow::UNBOUNDED => ("half-spaces", limits::UNBOUNDED_LIMIT),
-            overflow::SWEEP => ("sweep", limits::SWEEP_ITEM_LIMIT),
-            _ => ("partners", limits::TURN_LIMIT),
-        };
-        let error = Error::Capacity { buffer, needed, capacity: capacity.into() };
-        if buffer != "pairs" {
-            return Err(error);
-        }
-        let room = limits::more(buffer, needed, capacity, limits::BYTES_A_PAIR, &within(&self.gpu, &self.params))?;
-        let old = self.sizes.pairs;
-        let control = self.buffers.buffer("control")?;
-        let free_count: u32 = bytemuck::pod_read_unaligned(&read_now(&self.gpu, control, 20, 4)?);
-        let free = read_now(&self.gpu, self.buffers.buffer("free_slots")?, 0, 4 * u64::from(free_count))?;
-        let sizes = Sizes { pairs: room, ..self.sizes };
-        // On an error some arrays are larger than they must be, and the world is as good as before.
-        store::grow(&self.gpu, &mut self.buffers, &sizes)
-            .map_err(|e| if matches!(e, Error::Capacity { .. }) { error } else { e })?;
-        self.stages = Stages::new(&self.gpu, &mut self.pipelines, &sizes, &self.built)?;
-        self.sizes = sizes;
-        let free = store::write_free(&self.gpu, &self.buffers, &bytemuck::pod_collect_to_vec(&free), old, &sizes)?;
-        let control = self.buffers.buffer("control")?;
-        self.gpu.queue.write_buffer(control, 0, bytemuck::cast_slice(&[0u32; 3]));
-        self.gpu.queue.write_buffer(control, 20, bytemuck::bytes_of(&free));
-        self.last.stop = 0;
-        self.count_growth("pairs");
-        Ok(())
-    }
-
-    /// Makes room for the edits and what they brought.
-    fn make_room(&mut self, needed: Room) -> Result<()> {
-        let Sizes { bodies, colliders, .. } = self.sizes;
-        let room = Room { bodies, colliders, edits: self.edit_room };
-        let (room, grown) = room.grown(&needed, &within(&self.gpu, &self.params))?;
-        if room.edits > self.edit_room {
-            for buffer in ["edit_records", "edit_ranges"] {
-                self.buffers.grow(&self.gpu, buffer, room.edits.into(), false)?;
-            }
-            self.edit_room = room.edits;
-        }
-        if (room.bodies, room.colliders) != (bodies, colliders) {
-            self.grow_scene(Sizes { bodies: room.bodies, colliders: room.colliders, ..self.sizes })?;
-        }
-        grown.into_iter().for_each(|buffer| self.count_growth(buffer));
-        Ok(())
-    }
-
-    fn grow_scene(&mut self, sizes: Sizes) -> Result<()> {
-        self.take_statuses(0)?;
-        let sizes = Sizes { pairs: self.sizes.pairs, ..sizes };
-        store::grow(&self.gpu, &mut self.buffers, &sizes)?;
-        self.stages = Stages::new(&self.gpu, &mut self.pipelines, &sizes, &self.built)?;
-        self.pose_copies = Readback::new(&self.gpu, "pose copy", pose_bytes(&sizes), 1)?;
-        self.step_copies = Readback::new(&self.gpu, "step copy", size_of::<Control>() as u64, 1)?;
-        self.sizes = sizes;
-        Ok(())
-    }
-
-    fn count_growth(&mut self, buffer: &'static str) {
-        match self.growths.iter_mut().find(|(name, _)| *name == buffer) {
-            Some((_, count)) => *count += 1,
-            None => self.growths.push((buffer, 1)),
-        }
-    }
 }
 
 /// How many of the first batches have a dispatch of their own: up to the last that is worth one.
@@ -534,13 +396,6 @@ fn extent_of(status: &Control) -> Vec3 {
     // As shaders make an integer that rises with the float.
     let float = |x: u32| f32::from_bits(if x >> 31 == 1 { x & 0x7fff_ffff } else { !x });
     Vec3::from_array(status.center_max.map(float)) - Vec3::from_array(status.center_min.map(float))
-}
-
-/// The capacities that the user allows and the device has.
-fn within(gpu: &Gpu, params: &Params) -> Capacities {
-    let limits = gpu.device.limits();
-    let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    Capacities { max_array_bytes: params.capacities.max_array_bytes.min(most), ..params.capacities }
 }
 
 fn pose_bytes(sizes: &Sizes) -> u64 {

@@ -1,342 +1,66 @@
-//! A world on the CPU: buffers, the order of the passes, capacity and the edit log.
+//! What a world keeps, and a step of it: the plan phase, which writes nothing that lasts, and the commit.
 
+use super::Stopwatch;
 use crate::batch::{self, Batches};
 use crate::broadphase::{self, Boxes, Finder, Search, TooMany};
 use crate::contact::{self, Matched};
 use crate::shared::Shared;
 use crate::solver::{self, Rows, prepare, store};
-use crate::{bounds, edit, motion, narrowphase, query};
+use crate::{bounds, edit, motion, narrowphase};
 use bytemuck::Zeroable;
-use glam::Vec3;
 use rayon::prelude::*;
-use std::time::Instant;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{
     Aabb, BodyProps, BodyState, Collider, Control, FoundManifold, Impulse, Manifold, Pair, PoseRecord,
     QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, body_flags,
 };
-use tumble_core::limits::{self, Room};
-use tumble_core::{Broadphase, Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
-use tumble_core::{Nearest, NearestQuery, OverlapShape, Overlaps, Ray, RayHit};
-
-/// A simulation on the CPU.
-pub struct World {
-    editor: Editor,
-    params: Params,
-    pool: rayon::ThreadPool,
-    kept: Kept,
-    room: Room,
-    report: StepReport,
-    adapter: String,
-    growths: Vec<(&'static str, u32)>,
-    drop_pair: u32,
-    finder: Finder,
-    /// How far colliders lay apart in the step of this number.
-    extent: Option<(u32, Vec3)>,
-    queries: query::Cached,
-    /// Why the last step did not run.
-    failed: Option<Error>,
-}
+use tumble_core::{Broadphase, Error, Params, Result, limits};
 
 /// What lives past a step; written only when a step commits (properties and colliders by edits, absolutely).
-struct Kept {
-    control: Control,
-    states: Vec<BodyState>,
-    props: Vec<BodyProps>,
-    colliders: Vec<Collider>,
-    pairs: Vec<Pair>,
-    free: Vec<u32>,
+pub(super) struct Kept {
+    pub(super) control: Control,
+    pub(super) states: Vec<BodyState>,
+    pub(super) props: Vec<BodyProps>,
+    pub(super) colliders: Vec<Collider>,
+    pub(super) pairs: Vec<Pair>,
+    pub(super) free: Vec<u32>,
     /// By slot.
-    batch_of_slot: Vec<u32>,
+    pub(super) batch_of_slot: Vec<u32>,
     /// Four a slot.
-    impulses: Vec<Impulse>,
+    pub(super) impulses: Vec<Impulse>,
     /// By slot.
-    found: Vec<FoundManifold>,
-    poses: Vec<PoseRecord>,
+    pub(super) found: Vec<FoundManifold>,
+    pub(super) poses: Vec<PoseRecord>,
     /// The solver's rows, kept for their room alone.
-    rows: Rows,
+    pub(super) rows: Rows,
 }
 
 /// What the plan phase of a step finds; nothing of it lasts unless the step commits.
-struct Planned {
-    states: Vec<BodyState>,
-    matched: Matched,
-    manifolds: Vec<Manifold>,
-    batches: Batches,
-    control: Control,
-}
-
-/// Milliseconds by stage, when asked for.
-struct Stopwatch {
-    last: Option<Instant>,
-    stages: Vec<StageTime>,
-}
-
-impl Stopwatch {
-    fn new(on: bool) -> Self {
-        Self { last: on.then(Instant::now), stages: Vec::new() }
-    }
-    fn lap(&mut self, stage: &'static str) {
-        if let Some(last) = &mut self.last {
-            let now = Instant::now();
-            let milliseconds = Some((now - *last).as_secs_f64() * 1e3);
-            self.stages.push(StageTime { stage, milliseconds });
-            *last = now;
-        }
-    }
-}
-
-impl World {
-    /// Loads a scene.
-    pub fn new(scene: Scene, params: Params) -> Result<Self> {
-        params.validate()?;
-        let (editor, packed) = Editor::new(scene)?;
-        let threads = params.threads.unwrap_or(0);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| Error::Invalid {
-            what: format!("Params ({error})"),
-            field: "threads",
-            value: threads.to_string(),
-            allowed: "a number of threads that the system can start",
-        })?;
-        let adapter = format!("{}, {} threads", std::env::consts::ARCH, pool.current_num_threads());
-        let mut kept = Kept {
-            control: Control::zeroed(),
-            poses: packed.states.iter().zip(&packed.props).map(|(s, p)| PoseRecord::of(s, p)).collect(),
-            states: packed.states,
-            props: packed.props,
-            colliders: packed.colliders,
-            pairs: Vec::new(),
-            free: Vec::new(),
-            batch_of_slot: Vec::new(),
-            impulses: Vec::new(),
-            found: Vec::new(),
-            rows: Rows::default(),
-        };
-        let (bodies, colliders) = (kept.states.len() as u32, kept.colliders.len() as u32);
-        kept.reserve_pairs(limits::initial_pairs(&params.capacities, colliders))?;
-        Ok(Self {
-            editor,
-            room: Room::first(&params.capacities, bodies, colliders),
-            params,
-            pool,
-            kept,
-            report: StepReport::default(),
-            adapter,
-            growths: Vec::new(),
-            drop_pair: u32::MAX,
-            finder: Finder::default(),
-            extent: None,
-            queries: query::Cached::default(),
-            failed: None,
-        })
-    }
-
-    /// Adds a remark to what reports say of where the world runs.
-    #[doc(hidden)]
-    pub fn note(&mut self, remark: &str) {
-        self.adapter = format!("{} ({remark})", self.adapter);
-    }
-
-    /// Edits for the next step.
-    pub fn edit(&mut self) -> &mut Editor {
-        &mut self.editor
-    }
-
-    /// The scene as edited so far.
-    pub fn scene(&self) -> &Scene {
-        self.editor.scene()
-    }
-
-    /// Parameters in force.
-    pub fn params(&self) -> &Params {
-        &self.params
-    }
-
-    /// Parameters from the next step on. The number of threads stays as it was.
-    pub fn set_params(&mut self, params: Params) -> Result<()> {
-        params.validate()?;
-        self.params = params;
-        Ok(())
-    }
-
-    /// Test hook: the next step leaves out the pair of this index.
-    #[doc(hidden)]
-    pub fn drop_pair(&mut self, index: u32) {
-        self.drop_pair = index;
-    }
-
-    /// Runs one step.
-    ///
-    /// # Errors
-    /// [`Error::Capacity`] when it needs more room than it may have: the step did not run, its edits wait for the next
-    /// call, and the last good state stays readable.
-    pub fn step(&mut self) -> Result<()> {
-        let needed = Room {
-            bodies: self.editor.body_slots() as u32,
-            colliders: self.editor.collider_slots() as u32,
-            edits: self.editor.edit_count() as u32,
-        };
-        let (room, grown) = self.room.grown(&needed, &self.params.capacities)?;
-        self.room = room;
-        grown.into_iter().for_each(|buffer| self.count_growth(buffer));
-        let number = self.kept.control.step + 1;
-        // As late as on a GPU.
-        if let Some((_, extent)) = self.extent.take_if(|(seen, _)| *seen + limits::STATUS_DELAY == number) {
-            self.editor.look(extent);
-        }
-        let edits = self.editor.take();
-        let mut step = self.params.step_params(number, self.editor.scene().gravity);
-        step.body_count = needed.bodies;
-        step.collider_count = needed.colliders;
-        step.edit_ranges = edits.ranges.len() as u32;
-        step.cell_table_bits = limits::cell_table_bits(step.collider_count);
-        step.large_limit = limits::large_limit(step.collider_count, self.editor.spread().is_wide());
-        step.drop_pair = self.drop_pair;
-        self.failed = self.run(&edits, step).err();
-        if let Some(error) = self.failed.clone() {
-            self.editor.put_back(edits);
-            return Err(error);
-        }
-        self.drop_pair = u32::MAX;
-        if (step.step + limits::STATUS_DELAY).is_multiple_of(limits::LOOK_EVERY) {
-            self.extent = Some((step.step, self.finder.extent()));
-        }
-        Ok(())
-    }
-
-    /// Waits for all steps (here they are done) and returns the last one's report.
-    pub fn sync(&mut self) -> Result<StepReport> {
-        Ok(self.report.clone())
-    }
-
-    /// All poses after the last step.
-    pub fn poses(&mut self) -> Result<Poses> {
-        Ok(Poses::from_records(self.kept.control.step as u64, &self.kept.poses))
-    }
-
-    /// The newest finished poses.
-    pub fn try_poses(&mut self) -> Result<Option<Poses>> {
-        self.poses().map(Some)
-    }
-
-    /// All velocities after the last step.
-    pub fn velocities(&mut self) -> Result<Velocities> {
-        Ok(Velocities::from_states(self.kept.control.step as u64, &self.kept.states))
-    }
-
-    /// The first collider that each ray meets, or none; in the order of the rays.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] names the ray and the field. [`Error::Capacity`] when a ray meets more nodes of the tree than a
-    /// shader's loop may, or when the last step did not run for want of room: its edits are half applied.
-    pub fn cast_rays(&mut self, rays: &[Ray]) -> Result<Vec<Option<RayHit>>> {
-        self.ask(|queries, editor| queries.cast_rays(rays, editor))
-    }
-
-    /// Whether each ray meets any collider; cheaper than [`World::cast_rays`].
-    ///
-    /// # Errors
-    /// As for [`World::cast_rays`].
-    pub fn cast_rays_any(&mut self, rays: &[Ray]) -> Result<Vec<bool>> {
-        self.ask(|queries, _| queries.cast_rays_any(rays))
-    }
-
-    /// The colliders that each shape overlaps.
-    ///
-    /// # Errors
-    /// As for [`World::cast_rays`].
-    pub fn overlaps(&mut self, shapes: &[OverlapShape]) -> Result<Overlaps> {
-        self.ask(|queries, editor| queries.overlaps(shapes, editor))
-    }
-
-    /// The collider nearest to each point, or none.
-    ///
-    /// # Errors
-    /// As for [`World::cast_rays`].
-    pub fn nearest(&mut self, points: &[NearestQuery]) -> Result<Vec<Option<Nearest>>> {
-        self.ask(|queries, editor| queries.nearest(points, editor))
-    }
-
-    /// Asks about the state after the last step.
-    fn ask<T: Send>(&mut self, ask: impl FnOnce(&query::Cached, &Editor) -> Result<T> + Send) -> Result<T> {
-        self.failed.clone().map_or(Ok(()), Err)?;
-        let (kept, editor, queries) = (&self.kept, &self.editor, &mut self.queries);
-        self.pool.install(|| {
-            queries.refresh(kept.control.step, &kept.colliders, &kept.states, self.params.morton_bits);
-            ask(queries, editor)
-        })
-    }
-
-    /// Plans and commits a step, growing the pair list between where that is needed and allowed.
-    fn run(&mut self, edits: &EditBatch, mut step: StepParams) -> Result<()> {
-        let restitution = self.editor.plan().restitution;
-        let broadphase = self.params.broadphase.resolve(self.editor.spread());
-        loop {
-            let mut watch = Stopwatch::new(self.params.profile);
-            step.pair_capacity = (self.kept.impulses.len() / 4) as u32;
-            let (kept, pool, finder) = (&mut self.kept, &self.pool, &mut self.finder);
-            let asked = Asked { edits, params: &self.params, broadphase };
-            let planned = pool.install(|| kept.plan(&asked, finder, &step, &mut watch));
-            match planned {
-                Ok(planned) => {
-                    pool.install(|| kept.commit(planned, &step, restitution, &mut watch));
-                    self.finish(watch, broadphase);
-                    return Ok(());
-                }
-                Err(overflow) => self.grow(overflow)?,
-            }
-        }
-    }
-
-    fn grow(&mut self, overflow: Overflow) -> Result<()> {
-        let Overflow { buffer, needed, capacity } = overflow;
-        if buffer != "pairs" {
-            return Err(Error::Capacity { buffer, needed, capacity: capacity.into() });
-        }
-        let room = limits::more(buffer, needed, capacity, limits::BYTES_A_PAIR, &self.params.capacities)?;
-        self.kept.reserve_pairs(room)?;
-        self.count_growth(buffer);
-        Ok(())
-    }
-
-    fn count_growth(&mut self, buffer: &'static str) {
-        match self.growths.iter_mut().find(|(name, _)| *name == buffer) {
-            Some((_, count)) => *count += 1,
-            None => self.growths.push((buffer, 1)),
-        }
-    }
-
-    fn finish(&mut self, watch: Stopwatch, broadphase: Broadphase) {
-        let mut report = StepReport::from_control(&self.kept.control);
-        report.backend = "cpu";
-        report.adapter = self.adapter.clone();
-        report.bodies = self.editor.scene().len() as u32;
-        report.growths = self.growths.clone();
-        report.broadphase = broadphase;
-        report.broadphase_bytes = self.finder.bytes();
-        report.memory_bytes = self.kept.bytes() + self.finder.bytes() + self.queries.bytes();
-        report.stages = watch.stages;
-        self.report = report;
-    }
+pub(super) struct Planned {
+    pub(super) states: Vec<BodyState>,
+    pub(super) matched: Matched,
+    pub(super) manifolds: Vec<Manifold>,
+    pub(super) batches: Batches,
+    pub(super) control: Control,
 }
 
 /// What a step is to do, beside its numbers.
 #[derive(Clone, Copy)]
-struct Asked<'a> {
-    edits: &'a EditBatch,
-    params: &'a Params,
-    broadphase: Broadphase,
+pub(super) struct Asked<'a> {
+    pub(super) edits: &'a EditBatch,
+    pub(super) params: &'a Params,
+    pub(super) broadphase: Broadphase,
 }
 
 /// A bound that the plan phase found passed.
-struct Overflow {
-    buffer: &'static str,
-    needed: u64,
-    capacity: u32,
+pub(super) struct Overflow {
+    pub(super) buffer: &'static str,
+    pub(super) needed: u64,
+    pub(super) capacity: u32,
 }
 
 impl Kept {
-    fn reserve_pairs(&mut self, capacity: u32) -> Result<()> {
+    pub(super) fn reserve_pairs(&mut self, capacity: u32) -> Result<()> {
         let (old, count) = (self.batch_of_slot.len() as u32, capacity as usize);
         // Lowest slots on top of the stack.
         let mut free: Vec<u32> = Vec::new();
@@ -354,7 +78,7 @@ impl Kept {
     }
 
     /// Bytes of what is kept, and of the last step's scratch.
-    fn bytes(&self) -> u64 {
+    pub(super) fn bytes(&self) -> u64 {
         let body =
             2 * size_of::<BodyState>() + size_of::<BodyProps>() + size_of::<PoseRecord>() + size_of::<SolverBody>();
         let collider = size_of::<Collider>() + size_of::<Aabb>();
@@ -368,7 +92,7 @@ impl Kept {
     }
 
     /// Everything up to the first write to what lives past the step.
-    fn plan(
+    pub(super) fn plan(
         &mut self,
         asked: &Asked,
         finder: &mut Finder,
@@ -465,7 +189,7 @@ impl Kept {
     }
 
     /// Solves and writes everything that lives past the step.
-    fn commit(&mut self, planned: Planned, step: &StepParams, restitution: bool, watch: &mut Stopwatch) {
+    pub(super) fn commit(&mut self, planned: Planned, step: &StepParams, restitution: bool, watch: &mut Stopwatch) {
         let Planned { states, matched, manifolds, batches, mut control } = planned;
         let mut bodies: Vec<SolverBody> = (0..states.len())
             .into_par_iter()
