@@ -8,8 +8,9 @@ impl World {
     /// The first collider that each ray meets, or none; in the order of the rays.
     ///
     /// # Errors
-    /// [`Error::Invalid`](tumble_core::Error::Invalid) names the ray and the field. [`Error::Capacity`](tumble_core::Error::Capacity) when a ray meets more nodes of the tree than a
-    /// shader's loop may, or when the last step did not run for want of room: its edits are half applied.
+    /// [`Error::Invalid`](tumble_core::Error::Invalid) names the ray and the field.
+    /// [`Error::Capacity`](tumble_core::Error::Capacity) when a ray meets more nodes of the tree than a shader's loop
+    /// may, or when the last step did not run for want of room: its edits are half applied.
     pub fn cast_rays(&mut self, rays: &[Ray]) -> Result<Vec<Option<RayHit>>> {
         self.ask(|queries, editor| queries.cast_rays(rays, editor))
     }

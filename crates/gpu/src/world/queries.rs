@@ -8,8 +8,9 @@ impl World {
     /// Waits for all submitted steps; the first collider that each ray meets, or none, in the order of the rays.
     ///
     /// # Errors
-    /// [`Error::Invalid`](tumble_core::Error::Invalid) names the ray and the field. [`Error::Capacity`](tumble_core::Error::Capacity) when a ray meets more nodes of the tree than a
-    /// loop may. As for [`World::step`].
+    /// [`Error::Invalid`](tumble_core::Error::Invalid) names the ray and the field.
+    /// [`Error::Capacity`](tumble_core::Error::Capacity) when a ray meets more nodes of the tree than a loop may. As
+    /// for [`World::step`].
     pub fn cast_rays(&mut self, rays: &[Ray]) -> Result<Vec<Option<RayHit>>> {
         self.asker()?.cast_rays(rays)
     }
