@@ -278,10 +278,11 @@ fn print(case: &Case, seed: u64, records: &[Record]) {
     println!("{}{}: {}", case.name, if seed > 0 { format!(", seed {seed}") } else { String::new() }, case.about);
     let headline = case.errors.first().map_or("", |error| error.name);
     for r in records.iter().filter(|r| r.quantity == headline && r.kind == Kind::Case) {
-        let (ms, p95) = (r.ms_median.unwrap_or(f64::NAN), r.ms_p95.unwrap_or(f64::NAN));
+        let ms = |time: Option<f64>| time.map_or_else(|| "-".into(), |ms| format!("{ms:.3}"));
+        let (median, p95) = (ms(r.ms_median), ms(r.ms_p95));
         let value = r.value.map_or_else(|| r.note.clone(), |v| format!("{:11.4e} {} {}", v, r.unit, r.quantity));
         println!(
-            "  {:<12} dt 1/{:<4.0} {:>3} sub-steps {ms:9.3} ms (p95 {p95:9.3})  {value}",
+            "  {:<12} dt 1/{:<4.0} {:>3} sub-steps {median:>9} ms (p95 {p95:>9})  {value}",
             r.engine,
             1.0 / r.dt,
             r.substeps

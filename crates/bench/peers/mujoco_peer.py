@@ -1,4 +1,9 @@
-"""MuJoCo as a peer of the bench. Needs `pip install mujoco` (made with 3.17.0 and 4.0.0); see protocol.py."""
+"""MuJoCo as a peer of the bench. Needs `pip install mujoco` (made with 3.17.0 and 4.0.0); see protocol.py.
+
+Options: "cone", "elliptic" (taken here) or "pyramidal" (MuJoCo's default: stiffer, but along the diagonals of its
+axes friction is 71 % of what was asked); "timeconst", seconds, of the contacts' spring (default 0.02; MuJoCo takes at
+least two steps).
+"""
 
 import time
 
@@ -6,11 +11,15 @@ import mujoco
 import numpy as np
 
 from protocol import (
-    finite_lists, frictions, not_modelled, quat_between, quat_mul, Refused, serve, timed,
+    check_options, finite_lists, frictions, named_options, not_modelled, quat_between, quat_mul, Refused, serve, timed,
 )
 
 # Full warnings: contacts or rows that found no room. The others tell of bad numbers, which the state shows as null.
 DROPPED = (mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL)
+
+
+CONES = {"elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC, "pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL}
+OPTIONS = ("cone", "timeconst")
 
 
 def wxyz(q):
@@ -18,19 +27,20 @@ def wxyz(q):
 
 
 class Engine:
-    def load(self, gravity, bodies, dt, substeps, threads):
+    def load(self, gravity, bodies, dt, substeps, threads, options):
         start = time.perf_counter()
         spec = mujoco.MjSpec()
         spec.option.timestep = dt / substeps
         spec.option.gravity = gravity
         # The cone is round, as in the other engines; MuJoCo's own default is a pyramid inside it.
-        spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        check_options(options, OPTIONS)
+        spec.option.cone = CONES[options.get("cone", "elliptic")]
         # A state that blows up is to be seen, not put back to the start.
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         # Reserved, not touched, until contacts and rows need it; overflow is an error in `step`.
         spec.memory = max(256 << 20, len(bodies) << 20)
         for i, body in enumerate(bodies):
-            add_body(spec.worldbody, body, f"body {i}")
+            add_body(spec.worldbody, body, f"body {i}", options.get("timeconst", 0.02))
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         if threads > 1:
@@ -52,27 +62,34 @@ class Engine:
         mujoco.mj_forward(self.model, self.data)
         return {
             "engine": "mujoco", "version": mujoco.__version__, "adapter": f"CPU, {max(threads, 1)} threads",
-            "differs": self.differs(bodies, dt, substeps, threads), "mass": float(self.model.body_mass.sum()),
+            "differs": self.differs(bodies, dt, substeps, threads, options), "mass": float(self.model.body_mass.sum()),
             "load_ms": (time.perf_counter() - start) * 1e3, "warm_ms": 0.0,
         }
 
-    def differs(self, bodies, dt, substeps, threads):
+    def differs(self, bodies, dt, substeps, threads, options):
         h = dt / substeps
+        timeconst = options.get("timeconst", 0.02)
         out = [
             f"no sub-steps: {substeps} full steps of {h:.6g} s each, with collision in each",
             "double precision; the others compute in single",
             "one implicit problem of all contacts, Newton to 1e-8 or 100 iterations (defaults), not sweeps",
-            f"soft contacts with MuJoCo's defaults (solref 0.02 1, solimp 0.9 0.95 0.001): time constant "
-            f"{max(0.02, 2 * h):.4g} s (not below 2 steps); resting contacts sink by design, and friction creeps",
-            "friction cone elliptic, not MuJoCo's default pyramid; impratio 1, no-slip iterations 0 (defaults)",
+            f"soft contacts (solref {timeconst:g} 1, solimp 0.9 0.95 0.001; defaults are 0.02 1 and the same): time "
+            f"constant {max(timeconst, 2 * h):.4g} s, not below 2 steps; it sets how deep resting contacts sink, not "
+            "the number of steps; friction creeps",
+            "convex contacts: a body that slides fast is lifted a little by friction, and may hop",
+            "impratio 1, no-slip iterations 0 (defaults)",
             "no contact margin: a contact exists only once the shapes touch",
             "integrator Euler (default): gyroscopic torque is taken at the step's start",
         ]
+        if options.get("cone", "elliptic") == "elliptic":
+            out.append("friction cone elliptic, round as in the other engines; MuJoCo's default is a pyramid inside it")
+        if np.abs(self.centre).max(initial=0) > 1e-9:
+            out.append("bodies whose frame is not at the centre of mass: Euler's method drifts (freejoint align off)")
         if len(frictions(bodies)) > 1:
             out.append("friction coefficients differ: of a pair MuJoCo takes the larger")
         if threads > 1:
             out.append("thread pool on, which MuJoCo leaves off by default: contacts and islands are shared out")
-        return out
+        return out + named_options(options)
 
     def qvel(self):
         return self.data.qvel.reshape(-1, 6)
@@ -107,7 +124,7 @@ class Engine:
         }
 
 
-def add_body(world, body, where):
+def add_body(world, body, where, timeconst):
     if body["type"] == "kinematic" and (any(body["linvel"]) or any(body["angvel"])):
         raise not_modelled(where, "a kinematic body that moves (MuJoCo's mocap bodies have no velocity)", "leave it out")
     if body["linear_damping"] or body["angular_damping"]:
@@ -131,7 +148,7 @@ def add_body(world, body, where):
             rotation = quat_mul(rotation, quat_between([0, 0, 1], value))
         geom = frame.add_geom(
             type=kind, size=size, pos=collider["translation"], quat=wxyz(rotation),
-            friction=[collider["friction"], 0.005, 0.0001],
+            friction=[collider["friction"], 0.005, 0.0001], solref=[timeconst, 1],
         )
         if collider["mass"] is None:
             geom.density = collider["density"]

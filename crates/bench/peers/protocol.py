@@ -3,10 +3,14 @@
 One JSON object a line. Requests come on stdin, each gets exactly one line on the stdout that the process was
 started with; whatever a library prints goes to stderr.
 
-    {"op":"load","scene":{...},"dt":s,"substeps":n,"threads":t}
+    {"op":"load","scene":{...},"dt":s,"substeps":n,"threads":t,"options":{}}
         -> {"ok":true,"engine":..,"version":..,"adapter":..,"differs":[..],"mass":kg|null,"load_ms":..,"warm_ms":..}
     {"op":"step","count":n}  -> {"ms":[one a step, host clock, result waited for]}
     {"op":"state"}           -> {"translation":[[x,y,z]..],"rotation":[[x,y,z,w]..],"linvel":[..],"angvel":[..]}
+
+`threads` may be left out or 0: the engine's own choice. `options` may be left out: settings of this one engine that
+leave its defaults, named in its script; all that were given are named in `differs`. `mass` is that of the dynamic bodies
+as the engine reads it back, null where it cannot. `load_ms` contains `warm_ms`, the time for compiling.
 
 A failure answers {"error":"what, where, what to do"} and the process goes on. A scene that the engine cannot model
 answers {"error":"not modelled: ..."}. The end of input ends the process with 0.
@@ -99,6 +103,17 @@ def vector(value, name, where):
     return [float(x) for x in value]
 
 
+def check_options(options, known):
+    unknown = set(options) - set(known)
+    if unknown:
+        raise Refused(f"options: {sorted(unknown)} are unknown; this engine knows {sorted(known)}")
+
+
+def named_options(options):
+    """The sentences of `differs` for options that were given."""
+    return [f"asked for, not the default: {key} {value}" for key, value in sorted(options.items())]
+
+
 def frictions(bodies):
     return {c["friction"] for b in bodies for c in b["colliders"]}
 
@@ -165,7 +180,7 @@ def serve(make_engine):
                 engine = engine or make_engine()
                 answer = {"ok": True, **engine.load(
                     *read_scene(request["scene"]), float(request["dt"]), int(request["substeps"]),
-                    int(request.get("threads") or 0),
+                    int(request.get("threads") or 0), request.get("options") or {},
                 )}
                 loaded = True
             elif op not in ("step", "state"):

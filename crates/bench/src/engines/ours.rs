@@ -46,7 +46,7 @@ pub(super) fn gpu(scene: &Scene, setting: &Setting, means: &Means) -> Result<Box
 
 impl Engine for Ours {
     fn step(&mut self, count: u32) -> Result<Vec<f64>, String> {
-        let Self { world, lost } = self;
+        let Self { world, lost, .. } = self;
         timed(count, || {
             world.step().map_err(|e| e.to_string())?;
             let report = world.sync().map_err(|e| e.to_string())?;

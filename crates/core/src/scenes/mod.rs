@@ -53,7 +53,7 @@ pub const ALL: &[StandardScene] = &[
         name: "many_pyramids",
         about: "rows of standing walls of 55 boxes each",
         default_bodies: 10_780,
-        build: |bodies| many_pyramids(bodies / 55, 10),
+        build: |bodies| if bodies < 55 { pyramid(pyramid_base(bodies)) } else { many_pyramids(bodies / 55, 10) },
     },
     StandardScene { name: "balls", about: "balls dropped into a pit", default_bodies: 4000, build: balls },
     StandardScene {
