@@ -17,16 +17,17 @@ import time
 import nexus3d
 
 from protocol import (
-    finite_lists, frictions, named_options, not_modelled, quat_between, quat_mul, read_scene, Refused, rotate, serve, timed,
+    finite_lists, frictions, named_options, not_modelled, quat_between, quat_mul, read_scene, Refused, rotate, serve,
+    timed,
 )
 
-# Pairs that the buffers hold for each collider. Dense piles of boxes have 4 to 8 overlapping boxes of the broad phase
-# a body. nexus grows its buffers when they are four fifths full, a step or more late; this keeps it from being late.
+# Pairs that the buffers hold for each collider: six times what a pile of 1,000 boxes has (2.6 a body). nexus grows full
+# buffers, but a step or more late and without a word; this keeps it from having to.
 PAIRS_PER_COLLIDER = 16
 FLOOR_THICKNESS = 20.0
 WARM_STEPS = 4
 FRICTION = {
-    "coulomb": "friction at each point (default); on a sliding box it measures 0.87 to 1 of the coefficient, by direction",
+    "coulomb": "friction at each point (default); a sliding box sees 0.87 to 1 of the coefficient, by direction",
     "simplified": "friction at the middle of a contact, with twist, as in Rapier; not nexus's default",
 }
 
@@ -79,7 +80,8 @@ class Engine:
         state.set_rbd_collisions_capacity(max(4096, PAIRS_PER_COLLIDER * colliders))
         state.set_rbd_timestep(dt, substeps)
         state.set_rbd_solver_params(**options)
-        handles = [add_body(state, body, f"body {i}", reach(bodies)) for i, body in enumerate(bodies)]
+        side = reach(bodies)
+        handles = [add_body(state, body, f"body {i}", side) for i, body in enumerate(bodies)]
         state.finalize(self.viewer)
         # Before `finalize` this does nothing, and says nothing.
         state.set_rbd_gravity(self.viewer, vec3(gravity))
@@ -93,14 +95,14 @@ class Engine:
             "no gyroscopic torque on free bodies: angular velocity stays without torque",
             FRICTION[p["friction_model"]],
             f"soft contacts at nexus's defaults: {p['contact_natural_frequency']:g} Hz, damping ratio "
-            f"{p['contact_damping_ratio']:g} ({p['static_contact_natural_frequency']:g} Hz, "
-            f"{p['static_contact_damping_ratio']:g} against fixed bodies), {p['internal_pgs_iterations']} iteration a "
+            f"{p['contact_damping_ratio']:g} (static: {p['static_contact_natural_frequency']:g} Hz, "
+            f"{p['static_contact_damping_ratio']:g}), {p['internal_pgs_iterations']} iteration a "
             f"sub-step, friction in it: {p['friction_in_bias_pass']}",
             f"penetration up to {p['allowed_linear_error'] * 1e3:.3g} mm is left, contacts exist from "
             f"{p['prediction_distance'] * 1e3:.3g} mm, recovery at most {p['max_corrective_velocity']:g} m/s",
             f"deterministic mode {self.state_api.deterministic()} (default): runs "
             "may differ",
-            f"room for {PAIRS_PER_COLLIDER} pairs a collider, 4,096 at least; overflow is not reported by nexus",
+            f"room for {PAIRS_PER_COLLIDER} pairs a collider, 4,096 at least; nexus grows it, but reports no overflow",
             "a step's time holds one read-back of all poses, so that the result is there",
         ]
         if any(c["shape"][0] == "halfspace" for b in bodies for c in b["colliders"]):
@@ -110,7 +112,7 @@ class Engine:
         if len(frictions(bodies)) > 1:
             out.append("friction coefficients differ: of a pair nexus takes the mean")
         if threads > 0:
-            out.append(f"threads are those of Mesa's software adapter (LP_NUM_THREADS={threads}); a real GPU ignores it")
+            out.append(f"threads are those of Mesa's software adapter (LP_NUM_THREADS={threads}); a GPU ignores it")
         return out + named_options(options)
 
     def advance(self):
