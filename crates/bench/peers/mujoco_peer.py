@@ -27,7 +27,7 @@ def wxyz(q):
 
 
 class Engine:
-    def load(self, gravity, bodies, dt, substeps, threads, options):
+    def load(self, gravity, bodies, dt, substeps, threads, options, _half_space_edge):
         start = time.perf_counter()
         spec = mujoco.MjSpec()
         spec.option.timestep = dt / substeps

@@ -37,23 +37,24 @@ class Engine:
         self.viewer = None
         self.threads = None
 
-    def load(self, gravity, bodies, dt, substeps, threads, options):
+    def load(self, gravity, bodies, dt, substeps, threads, options, half_space_edge):
         start = time.perf_counter()
+        side = half_space_edge or reach(bodies)
         self.open(threads)
         for scene in (small_scene(), wide_scene()) if self.first else ():
-            self.build(*read_scene(scene), 1 / 60, 4, {})
+            self.build(*read_scene(scene), 1 / 60, 4, {}, 100)
             self.step(WARM_STEPS)
         self.first = False
-        self.build(gravity, bodies, dt, substeps, options)
+        self.build(gravity, bodies, dt, substeps, options, side)
         self.step(WARM_STEPS)
         warm = time.perf_counter()
-        self.build(gravity, bodies, dt, substeps, options)
+        self.build(gravity, bodies, dt, substeps, options, side)
         poses = self.state_api.read_body_poses(self.viewer)
         if len(poses[0]) < len(self.slots) - self.slots.count(None):
             raise Refused(f"nexus holds {len(poses[0])} bodies of {len(bodies)}; try fewer")
         return {
             "engine": "nexus", "version": importlib.metadata.version("dimforge-nexus3d"), "adapter": adapters(),
-            "differs": self.differs(bodies, threads, options), "mass": None,
+            "differs": self.differs(bodies, threads, options, side), "mass": None,
             "load_ms": (time.perf_counter() - start) * 1e3, "warm_ms": (warm - start) * 1e3,
         }
 
@@ -74,13 +75,12 @@ class Engine:
         self.pipeline.preload_pipelines(viewer)
         self.viewer, self.threads, self.first = viewer, threads, True
 
-    def build(self, gravity, bodies, dt, substeps, options):
+    def build(self, gravity, bodies, dt, substeps, options, side):
         state = nexus3d.NexusState()
         colliders = sum(len(b["colliders"]) for b in bodies)
         state.set_rbd_collisions_capacity(max(4096, PAIRS_PER_COLLIDER * colliders))
         state.set_rbd_timestep(dt, substeps)
         state.set_rbd_solver_params(**options)
-        side = reach(bodies)
         handles = [add_body(state, body, f"body {i}", side) for i, body in enumerate(bodies)]
         state.finalize(self.viewer)
         # Before `finalize` this does nothing, and says nothing.
@@ -89,7 +89,7 @@ class Engine:
         self.slots = [state.body_gpu_index(0, handle) for handle in handles]
         self.poses = [b["translation"] + b["rotation"] for b in bodies]
 
-    def differs(self, bodies, threads, options):
+    def differs(self, bodies, threads, options, side):
         p = self.state_api.rbd_solver_params()
         out = [
             "no gyroscopic torque on free bodies: angular velocity stays without torque",
@@ -107,7 +107,7 @@ class Engine:
         ]
         if any(c["shape"][0] == "halfspace" for b in bodies for c in b["colliders"]):
             out.append(
-                f"half-spaces are boxes, {FLOOR_THICKNESS:g} m thick and {2 * reach(bodies):.0f} m wide, top face exact"
+                f"half-spaces are boxes, {FLOOR_THICKNESS:g} m thick and {2 * side:.0f} m wide, top face exact"
             )
         if len(frictions(bodies)) > 1:
             out.append("friction coefficients differ: of a pair nexus takes the mean")
