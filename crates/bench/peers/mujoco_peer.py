@@ -27,7 +27,7 @@ def wxyz(q):
 
 
 class Engine:
-    def load(self, gravity, bodies, dt, substeps, threads, options):
+    def load(self, gravity, bodies, dt, substeps, threads, options, _half_space_edge):
         start = time.perf_counter()
         spec = mujoco.MjSpec()
         spec.option.timestep = dt / substeps
@@ -126,7 +126,7 @@ class Engine:
 
 def add_body(world, body, where, timeconst):
     if body["type"] == "kinematic" and (any(body["linvel"]) or any(body["angvel"])):
-        raise not_modelled(where, "a kinematic body that moves (MuJoCo's mocap bodies have no velocity)", "leave it out")
+        raise not_modelled(where, "a kinematic body that moves (mocap bodies have no velocity)", "leave it out")
     if body["linear_damping"] or body["angular_damping"]:
         raise not_modelled(where, "damping as a rate (MuJoCo damps by force)", "set it to 0")
     frame = world.add_body(pos=body["translation"], quat=wxyz(body["rotation"]))

@@ -9,8 +9,9 @@ started with; whatever a library prints goes to stderr.
     {"op":"state"}           -> {"translation":[[x,y,z]..],"rotation":[[x,y,z,w]..],"linvel":[..],"angvel":[..]}
 
 `threads` may be left out or 0: the engine's own choice. `options` may be left out: settings of this one engine that
-leave its defaults, named in its script; all that were given are named in `differs`. `mass` is that of the dynamic bodies
-as the engine reads it back, null where it cannot. `load_ms` contains `warm_ms`, the time for compiling.
+leave its defaults, named in its script; all that were given are named in `differs`. `half_space_edge` may be left out:
+half the edge, m, of the box that stands for a half-space in an engine without them. `mass` is that of the dynamic
+bodies as the engine reads it back, null where it cannot. `load_ms` contains `warm_ms`, the time for compiling.
 
 A failure answers {"error":"what, where, what to do"} and the process goes on. A scene that the engine cannot model
 answers {"error":"not modelled: ..."}. The end of input ends the process with 0.
@@ -180,7 +181,7 @@ def serve(make_engine):
                 engine = engine or make_engine()
                 answer = {"ok": True, **engine.load(
                     *read_scene(request["scene"]), float(request["dt"]), int(request["substeps"]),
-                    int(request.get("threads") or 0), request.get("options") or {},
+                    int(request.get("threads") or 0), request.get("options") or {}, request.get("half_space_edge"),
                 )}
                 loaded = True
             elif op not in ("step", "state"):
