@@ -157,7 +157,7 @@ fn measure(args: &Args, machine: Machine, table: &mut Table) -> Result<(), Strin
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     let threads = args.threads.map_or(threads, |n| n as usize);
     let limit = if args.quick { 3.0 } else { args.limit };
-    let conditions = Conditions { means: Means { gpu, python: args.python.clone() }, threads, limit, machine };
+    let conditions = Conditions { means: Means::new(gpu, args.python.clone()), threads, limit, machine };
     let contestants = contestants(args, &conditions, table)?;
     let all = heats(
         &chosen(args)?,

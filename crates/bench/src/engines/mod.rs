@@ -36,6 +36,15 @@ pub struct Means {
     pub gpu: Option<Gpu>,
     /// An interpreter that has the wheels of nexus and MuJoCo.
     pub python: Option<PathBuf>,
+    /// Its processes that wait for their next scene.
+    idle: script::Idle,
+}
+
+impl Means {
+    /// Of a device and an interpreter.
+    pub fn new(gpu: Option<Gpu>, python: Option<PathBuf>) -> Self {
+        Self { gpu, python, idle: script::Idle::default() }
+    }
 }
 
 /// What an engine says of itself.
@@ -121,6 +130,7 @@ pub const ALL: &[Contestant] = &[
     Contestant { name: "box3d", cost: [4e-4, 1.5e-4], make: box3d::make, available: |_| Ok(()) },
     Contestant { name: "nexus", cost: [4e-3, 2e-3], make: script::nexus, available: script::has_nexus },
     Contestant { name: "mujoco", cost: [0.0, 1e-2], make: script::mujoco, available: script::has_mujoco },
+    Contestant { name: "mujoco stiff", cost: [0.0, 1e-2], make: script::stiff_mujoco, available: script::has_mujoco },
 ];
 
 /// Differences that hold for a whole engine, whatever the scene: engine, and what a reader must know.
@@ -136,7 +146,12 @@ pub const DIFFERS: &[(&str, &str)] = &[
          5 and friction in the second pass of a sub-step.",
     ),
     ("box3d", "C code built at -O2 with its SIMD, by the crate boxddd; its defaults. Half-spaces are large boxes."),
-    ("mujoco", "Joint coordinates and one global solve; no sub-steps: with n sub-steps it runs n whole steps of dt/n."),
+    (
+        "mujoco",
+        "One global solve a step (Newton), f64; no sub-steps: with n sub-steps it runs n whole steps of dt/n. Its contacts \
+         are as soft as its default time constant of 0.02 s makes them, however small the step; `mujoco stiff` has the \
+         shortest that it allows, two of its steps.",
+    ),
 ];
 
 /// Half the edge of a box that stands for a half-space in an engine without them, m: it reaches well past every body.

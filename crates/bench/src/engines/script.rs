@@ -1,22 +1,35 @@
 //! Engines with a Python wheel, nexus and MuJoCo, each in a process of its own: one line of JSON asks, one answers
-//! (`peers/protocol.py` tells the words). The process times its steps itself, so that the pipe costs nothing.
+//! (`peers/protocol.py` tells the words). The process times its steps itself, so that the pipe costs nothing, and serves
+//! one scene after the other, since its start takes seconds.
 
 use super::{Engine, Facts, Means, Refusal, Setting, half_space_edge};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tumble_core::{BodyHandle, ColliderBuilder, Pose, Poses, RigidBodyType, Scene, Shape, Velocities, Velocity};
 
 const PROTOCOL: &str = include_str!("../../peers/protocol.py");
 const NEXUS: &str = include_str!("../../peers/nexus_peer.py");
 const MUJOCO: &str = include_str!("../../peers/mujoco_peer.py");
 
-/// A process that holds a scene.
-struct Script {
-    process: Child,
-    ask: Option<ChildStdin>,
+/// A process that runs one of the programs.
+#[derive(Debug)]
+pub(super) struct Process {
+    child: Child,
+    requests: Option<ChildStdin>,
     answers: BufReader<ChildStdout>,
+}
+
+/// Processes that wait for a scene, by program.
+pub(super) type Idle = Arc<Mutex<Vec<(&'static str, Process)>>>;
+
+/// A process that holds a scene.
+pub(super) struct Script {
+    program: &'static str,
+    process: Option<Process>,
+    idle: Idle,
     bodies: Vec<BodyHandle>,
     facts: Facts,
 }
@@ -41,36 +54,41 @@ fn has_wheel(means: &Means, module: &str, wheel: &str) -> Result<(), String> {
 }
 
 pub(super) fn nexus(scene: &Scene, setting: &Setting, means: &Means) -> Result<Box<dyn Engine>, Refusal> {
-    start(scene, setting, means, NEXUS).map(|script| Box::new(script) as Box<dyn Engine>)
+    load(scene, setting, means, NEXUS, "default", json!({}))
 }
 
 pub(super) fn mujoco(scene: &Scene, setting: &Setting, means: &Means) -> Result<Box<dyn Engine>, Refusal> {
-    start(scene, setting, means, MUJOCO).map(|script| Box::new(script) as Box<dyn Engine>)
+    load(scene, setting, means, MUJOCO, "default", json!({}))
 }
 
-fn start(scene: &Scene, setting: &Setting, means: &Means, program: &str) -> Result<Script, Refusal> {
-    let python = means.python.clone().unwrap_or_else(|| PathBuf::from("python3"));
-    // Both texts as a module each, without a file: this program may run where its sources are not. A string in JSON is
-    // one in Python too.
-    let (protocol, main) = (json!(PROTOCOL), json!(program));
-    let both = format!(
-        "import sys, types\nm = types.ModuleType('protocol')\nexec({protocol}, m.__dict__)\nsys.modules['protocol'] = m\n\
-         exec(compile({main}, 'peer.py', 'exec'), {{'__name__': '__main__'}})\n"
-    );
-    let mut process = Command::new(&python)
-        .args(["-u", "-c", &both])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .map_err(|error| Refusal::Failed(format!("{}: {error}", python.display())))?;
-    let answers = BufReader::new(process.stdout.take().expect("its output is a pipe"));
-    let ask = process.stdin.take();
+/// Contacts as stiff as MuJoCo lets them be: a time constant of two of its steps.
+pub(super) fn stiff_mujoco(scene: &Scene, setting: &Setting, means: &Means) -> Result<Box<dyn Engine>, Refusal> {
+    let step = f64::from(setting.dt) / f64::from(setting.substeps);
+    load(scene, setting, means, MUJOCO, "stiff", json!({"timeconst": 2.0 * step}))
+}
+
+fn load(
+    scene: &Scene,
+    setting: &Setting,
+    means: &Means,
+    program: &'static str,
+    solver: &str,
+    options: Value,
+) -> Result<Box<dyn Engine>, Refusal> {
+    let idle = means.idle.clone();
+    let waiting = {
+        let mut idle = lock(&idle);
+        idle.iter().position(|(name, _)| *name == program).map(|i| idle.swap_remove(i).1)
+    };
+    let process = match waiting {
+        Some(process) => process,
+        None => Process::start(means, program).map_err(Refusal::Failed)?,
+    };
     let bodies = scene.bodies().collect();
-    let mut script = Script { process, ask, answers, bodies, facts: Facts::default() };
+    let mut script = Script { program, process: Some(process), idle, bodies, facts: Facts::default() };
     let load = json!({
         "op": "load", "scene": scene_json(scene), "dt": setting.dt, "substeps": setting.substeps,
-        "threads": setting.threads, "half_space_edge": half_space_edge(scene),
+        "threads": setting.threads, "half_space_edge": half_space_edge(scene), "options": options,
     });
     let told = script.ask(&load).map_err(|error| match error.strip_prefix("not modelled: ") {
         Some(what) => Refusal::Unmodelled(what.into()),
@@ -82,26 +100,74 @@ fn start(scene: &Scene, setting: &Setting, means: &Means, program: &str) -> Resu
     script.facts = Facts {
         version: text("version"),
         adapter: text("adapter"),
+        solver: solver.into(),
         differs: differs.unwrap_or_default(),
         ..Facts::default()
     };
-    Ok(script)
+    Ok(Box::new(script))
 }
 
-impl Script {
-    /// Asks, waits for the answer. An answer with `error` in it is an error.
+/// What a panic elsewhere left is as good as before.
+fn lock(idle: &Idle) -> MutexGuard<'_, Vec<(&'static str, Process)>> {
+    idle.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Process {
+    fn start(means: &Means, program: &str) -> Result<Self, String> {
+        let python = means.python.clone().unwrap_or_else(|| PathBuf::from("python3"));
+        // Both texts as a module each, without a file: this program may run where its sources are not. A string in JSON
+        // is one in Python too.
+        let (protocol, main) = (json!(PROTOCOL), json!(program));
+        let both = format!(
+            "import sys, types\nm = types.ModuleType('protocol')\nexec({protocol}, m.__dict__)\n\
+             sys.modules['protocol'] = m\nexec(compile({main}, 'peer.py', 'exec'), {{'__name__': '__main__'}})\n"
+        );
+        let mut child = Command::new(&python)
+            .args(["-u", "-c", &both])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .map_err(|error| format!("{}: {error}", python.display()))?;
+        let requests = child.stdin.take();
+        let answers = BufReader::new(child.stdout.take().ok_or("its output is no pipe")?);
+        Ok(Self { child, requests, answers })
+    }
+
+    /// Asks, waits for the answer.
     fn ask(&mut self, request: &Value) -> Result<Value, String> {
-        let pipe = self.ask.as_mut().ok_or("it has ended")?;
+        let pipe = self.requests.as_mut().ok_or("it has ended")?;
         writeln!(pipe, "{request}").and_then(|()| pipe.flush()).map_err(|error| format!("it has ended: {error}"))?;
         let mut line = String::new();
         let read = self.answers.read_line(&mut line).map_err(|error| error.to_string())?;
         if read == 0 {
             return Err("it ended without an answer".into());
         }
-        let answer: Value = serde_json::from_str(&line).map_err(|error| format!("no JSON ({error}): {line}"))?;
-        match answer["error"].as_str() {
-            Some(error) => Err(error.into()),
-            None => Ok(answer),
+        serde_json::from_str(&line).map_err(|error| format!("no JSON ({error}): {line}"))
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // The end of its input ends it.
+        self.requests = None;
+        let _ = self.child.wait();
+    }
+}
+
+impl Script {
+    /// Asks, waits for the answer. An answer with `error` in it is an error; a process that does not answer is let go.
+    fn ask(&mut self, request: &Value) -> Result<Value, String> {
+        let process = self.process.as_mut().ok_or("it has ended")?;
+        match process.ask(request) {
+            Ok(answer) => match answer["error"].as_str() {
+                Some(error) => Err(error.into()),
+                None => Ok(answer),
+            },
+            Err(error) => {
+                self.process = None;
+                Err(error)
+            }
         }
     }
 }
@@ -137,9 +203,9 @@ impl Engine for Script {
 
 impl Drop for Script {
     fn drop(&mut self) {
-        // The end of its input ends it.
-        self.ask = None;
-        let _ = self.process.wait();
+        if let Some(process) = self.process.take() {
+            lock(&self.idle).push((self.program, process));
+        }
     }
 }
 
