@@ -137,11 +137,10 @@ impl Heat {
             for i in 0..count {
                 // Nobody comes first every time.
                 let lane = &mut lanes[(i + round as usize) % count];
-                let goal = lane.total * round / ROUNDS;
-                let before = lane.done;
+                let (before, goal) = (lane.total * (round - 1) / ROUNDS, lane.total * round / ROUNDS);
                 lane.advance(goal, round > ROUNDS / 2, self.case.track, &scene, conditions.limit);
-                let share = if lane.engine.is_some() { lane.done - before } else { goal - before.min(goal) };
-                progress(share as f64 * bodies as f64 * weight(&lane.contestant, &lane.setting));
+                // What has given up is through with its share too.
+                progress((goal - before) as f64 * bodies as f64 * weight(&lane.contestant, &lane.setting));
             }
         }
         lanes.into_iter().flat_map(|lane| self.records(lane, &scene, bodies, conditions)).collect()
