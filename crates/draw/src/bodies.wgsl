@@ -22,9 +22,18 @@ fn along(axis: u32, n: f32, u: f32, v: f32) -> vec3<f32> {
     return vec3<f32>(u, v, n);
 }
 
-// Whether a side of the box has `a` before and `b` behind it, in the box's frame.
-fn separates(half: vec3<f32>, a: vec3<f32>, b: vec3<f32>) -> bool {
-    return any((abs(a) > half) & (abs(b) > half) & (a * b < vec3<f32>(0.0)));
+// Large fixed boxes beside or above what the eye looks at, as the walls of a pit, would hide or darken all that is to be
+// seen: they are glass, and throw no shadow.
+fn is_glass(instance: Instance, placed: Placed) -> bool {
+    let half = instance.size;
+    let large = 0.15 * frame.pixel * frame.size.y * frame.distance;
+    if placed.kind != BODY_FIXED || (frame.flags & SEE_THROUGH) == 0u || max(half.x, max(half.y, half.z)) < large {
+        return false;
+    }
+    let look_at = rotate_back(placed.rotation, frame.look_at - placed.position);
+    // Height of each axis, on the side that it is looked at from: 1 for floors, less than a half for walls and ceilings.
+    let up = rotate_back(placed.rotation, vec3<f32>(0.0, 1.0, 0.0)) * sign(look_at);
+    return any((abs(look_at) > half) & (up < vec3<f32>(0.5)));
 }
 
 // A vertex of a face that `eye`, in the box's frame, sees: the local position, and the face's outward normal. A normal of
@@ -52,20 +61,14 @@ fn corner(index: u32, half: vec3<f32>, eye: vec3<f32>) -> Corner {
     return Corner(along(axis, side * h.x, u, v), normal, vec2<f32>(u, v), h.yz);
 }
 
-fn cuboid_vertex(index: u32, instance: Instance, is_glass: bool) -> CuboidVertex {
+fn cuboid_vertex(index: u32, instance: Instance, wants_glass: bool) -> CuboidVertex {
     var out: CuboidVertex;
     out.clip = nowhere();
     let placed = place(instance);
-    if placed.kind == BODY_NONE {
+    if placed.kind == BODY_NONE || is_glass(instance, placed) != wants_glass {
         return out;
     }
-    let eye = rotate_back(placed.rotation, frame.eye - placed.position);
-    let look_at = rotate_back(placed.rotation, frame.look_at - placed.position);
-    let may_hide = placed.kind == BODY_FIXED && (frame.flags & SEE_THROUGH) != 0u;
-    if (may_hide && separates(instance.size, eye, look_at)) != is_glass {
-        return out;
-    }
-    let at = corner(index, instance.size, eye);
+    let at = corner(index, instance.size, rotate_back(placed.rotation, frame.eye - placed.position));
     if all(at.normal == vec3<f32>(0.0)) {
         return out;
     }
@@ -106,7 +109,7 @@ fn cuboid_color(in: CuboidVertex) -> @location(0) vec4<f32> {
 @fragment
 fn glass_color(in: CuboidVertex) -> @location(0) vec4<f32> {
     let line = edge(in);
-    return vec4<f32>(finish(mix(vec3<f32>(0.75, 0.82, 0.9), vec3<f32>(0.25), line)), mix(0.07, 0.4, line));
+    return vec4<f32>(finish(mix(vec3<f32>(0.75, 0.82, 0.9), vec3<f32>(0.25), line)), mix(0.035, 0.35, line));
 }
 
 struct BallVertex {
@@ -176,22 +179,15 @@ fn ball_color(in: BallVertex) -> BallPixel {
     return BallPixel(vec4<f32>(finish(color), covered), saturate(frame.near / depth));
 }
 
-// Whether a wall lets the light through, because all that the picture shows would lie in its shadow.
-fn is_window(instance: Instance, placed: Placed, look_at: vec3<f32>, light: vec3<f32>) -> bool {
-    return placed.kind == BODY_FIXED && (frame.flags & SEE_THROUGH) != 0u
-        && separates(instance.size, look_at, look_at + 1e4 * frame.distance * light);
-}
-
 @vertex
 fn cuboid_shadow(@builtin(vertex_index) index: u32, instance: Instance) -> @builtin(position) vec4<f32> {
     let placed = place(instance);
-    let light = rotate_back(placed.rotation, frame.light);
-    let look_at = rotate_back(placed.rotation, frame.look_at - placed.position);
-    if placed.kind == BODY_NONE || is_window(instance, placed, look_at, light) {
+    if placed.kind == BODY_NONE || is_glass(instance, placed) {
         return nowhere();
     }
     // The light is far away, in its direction.
-    let at = corner(index, instance.size, light * 1e6 * length(instance.size));
+    let light = rotate_back(placed.rotation, frame.light) * 1e6 * length(instance.size);
+    let at = corner(index, instance.size, light);
     return frame.shadow_projection * vec4<f32>(placed.position + rotate(placed.rotation, at.local), 1.0);
 }
 

@@ -151,22 +151,24 @@ fn lit(position: vec3<f32>, normal: vec3<f32>) -> f32 {
 
 // Light that leaves a surface of this colour towards the eye, linear.
 fn shade(color: vec3<f32>, normal: vec3<f32>, position: vec3<f32>, gloss: f32) -> vec3<f32> {
-    let to_eye = normalize(frame.eye - position);
     let cosine = max(dot(normal, frame.light), 0.0);
     var key = 0.0;
     if cosine > 0.0 {
         key = cosine * lit(position, normal);
     }
-    let around = mix(vec3<f32>(0.20, 0.185, 0.17), vec3<f32>(0.40, 0.44, 0.50), 0.5 + 0.5 * normal.y);
-    let half_way = normalize(frame.light + to_eye);
-    let shine = gloss * key * pow(max(dot(normal, half_way), 0.0), 40.0);
+    let around = mix(vec3<f32>(0.25, 0.235, 0.22), vec3<f32>(0.44, 0.47, 0.52), 0.5 + 0.5 * normal.y);
+    var shine = 0.0;
+    if gloss > 0.0 && key > 0.0 {
+        let half_way = normalize(frame.light + normalize(frame.eye - position));
+        shine = gloss * key * pow(max(dot(normal, half_way), 0.0), 40.0);
+    }
     return color * (around + key * vec3<f32>(0.86, 0.82, 0.75)) + vec3<f32>(shine);
 }
 
 // As the picture stores it: bright parts bend towards white instead of being cut.
 fn finish(color: vec3<f32>) -> vec3<f32> {
     let over = max(color - vec3<f32>(0.7), vec3<f32>(0.0));
-    let soft = min(color, vec3<f32>(0.7)) + 0.3 * (vec3<f32>(1.0) - exp(-over / 0.3));
+    let soft = min(color, vec3<f32>(0.7)) + 0.3 * over / (over + 0.3);
     if (frame.flags & ENCODE) != 0u {
         return srgb_from_linear(soft);
     }

@@ -15,7 +15,8 @@ const PALETTE: [[u8; 3]; 8] = [
     [181, 210, 173],
     [240, 230, 210],
 ];
-const FIXED: [u8; 3] = [165, 170, 176];
+const FIXED: [u8; 3] = [190, 194, 199];
+const GROUND: [u8; 3] = [214, 216, 219];
 const KINEMATIC: [u8; 3] = [122, 104, 150];
 
 /// A collider as the shaders read it; see `frame.wgsl`. 52 bytes.
@@ -54,7 +55,7 @@ impl Instances {
                 if (builder.body_type == RigidBodyType::Dynamic) != is_dynamic {
                     continue;
                 }
-                let [r, g, b] = color(builder.body_type, body.slot());
+                let own_color = color(builder.body_type, body.slot());
                 for (_, collider) in colliders {
                     let (list, size, own) = match collider.shape {
                         Shape::Ball { radius } => (&mut all.balls, Vec3::splat(radius), Quat::IDENTITY),
@@ -66,6 +67,8 @@ impl Instances {
                         // A shape newer than this crate.
                         _ => continue,
                     };
+                    let is_ground = matches!(collider.shape, Shape::HalfSpace { .. });
+                    let [r, g, b] = if is_ground { GROUND } else { own_color };
                     list.push(Instance {
                         translation: collider.translation.to_array(),
                         body: body.slot() as u32,
@@ -90,10 +93,18 @@ fn color(kind: RigidBodyType, slot: usize) -> [u8; 3] {
         RigidBodyType::Fixed => FIXED,
         RigidBodyType::KinematicVelocityBased => KINEMATIC,
         RigidBodyType::Dynamic => {
-            // Neighbours by slot are neighbours in the scene: spread them.
-            let hash = (slot as u32).wrapping_mul(0x9e37_79b9) ^ (slot as u32).wrapping_mul(0x85eb_ca6b) >> 15;
-            let light = 0.93 + 0.07 * ((hash >> 8 & 255) as f32 / 255.0);
+            let hash = mix(slot as u32);
+            let light = 0.92 + 0.08 * ((hash & 255) as f32 / 255.0);
             PALETTE[(hash >> 29) as usize].map(|part| (f32::from(part) * light) as u8)
         }
     }
+}
+
+/// The same word for the same slot, and no pattern among neighbours, which often lie side by side (murmur3's last step).
+fn mix(slot: u32) -> u32 {
+    let mut x = slot ^ slot >> 16;
+    x = x.wrapping_mul(0x85eb_ca6b);
+    x ^= x >> 13;
+    x = x.wrapping_mul(0xc2b2_ae35);
+    x ^ x >> 16
 }

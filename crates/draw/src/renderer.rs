@@ -13,7 +13,7 @@ use wgpu::{
 };
 
 /// Towards the key light.
-const LIGHT: Vec3 = Vec3::new(0.45, 0.80, 0.40);
+const LIGHT: Vec3 = Vec3::new(-0.50, 0.80, 0.52);
 /// Corners of a quad as two triangles, three quads in turn (the faces of a box that an eye sees).
 const QUADS: [u16; 18] = [0, 1, 2, 2, 1, 3, 4, 5, 6, 6, 5, 7, 8, 9, 10, 10, 9, 11];
 /// Corners of the ball's shadow.

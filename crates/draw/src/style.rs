@@ -13,7 +13,8 @@ pub struct Style<'a> {
     pub lines: &'a [Line],
     /// Whether bodies cast shadows.
     pub shadows: bool,
-    /// Whether fixed boxes that stand between the camera and what it looks at are drawn as glass. They would hide it.
+    /// Whether large fixed boxes beside or above what the camera looks at, as the walls of a pit, are drawn as glass: they
+    /// would hide it, or leave it in the dark.
     pub see_through: bool,
 }
 
