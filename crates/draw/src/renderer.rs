@@ -9,7 +9,7 @@ use tumble_core::{Error, Result, Scene};
 use wgpu::util::DeviceExt;
 use wgpu::{
     BindGroup, Buffer, BufferUsages, CommandEncoder, Device, IndexFormat, LoadOp, Operations, RenderPass, StoreOp,
-    TextureFormat, TextureView,
+    TextureFormat, TextureFormatFeatureFlags, TextureView,
 };
 
 /// Towards the key light.
@@ -44,16 +44,23 @@ struct List {
 }
 
 impl Renderer {
-    /// For pictures of `format` (any 8-bit colour; where it does not encode sRGB, the shaders do) of this scene.
+    /// For pictures of `format` (any 8-bit colour; where it does not encode sRGB, the shaders do) of this scene, with four
+    /// samples a pixel where the format allows it, else one.
     ///
     /// # Errors
     /// [`Error::Gpu`] when the device refuses, as one without storage buffers in vertex shaders does; [`Error::Limits`]
     /// as for [`set_scene`](Self::set_scene).
     pub fn new(device: &Device, format: TextureFormat, scene: &Scene) -> Result<Self> {
         let features = format.guaranteed_format_features(device.features()).flags;
-        let can_sample = features.contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_X4)
-            && features.contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE);
-        let samples = if can_sample { 4 } else { 1 };
+        let needed = TextureFormatFeatureFlags::MULTISAMPLE_X4 | TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE;
+        Self::with_samples(device, format, if features.contains(needed) { 4 } else { 1 }, scene)
+    }
+
+    /// With so many samples a pixel, 1 or 4. On a software adapter one sample takes a third of the time of four.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new).
+    pub fn with_samples(device: &Device, format: TextureFormat, samples: u32, scene: &Scene) -> Result<Self> {
         let mut renderer = scoped(device, "the pipelines that draw", || {
             let mut indices: Vec<u16> = QUADS.into();
             indices.extend((1..DISC as u16 - 1).flat_map(|i| [0, i, i + 1]));

@@ -11,7 +11,7 @@ pub struct Style<'a> {
     pub markers: &'a [Marker],
     /// Lines.
     pub lines: &'a [Line],
-    /// Whether bodies cast shadows.
+    /// Whether bodies cast shadows. The light comes from above, along (0.5, -0.8, -0.52).
     pub shadows: bool,
     /// Whether large fixed boxes beside or above what the camera looks at, as the walls of a pit, are drawn as glass: they
     /// would hide it, or leave it in the dark.
