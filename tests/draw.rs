@@ -365,17 +365,82 @@ fn sizes_that_cannot_be_are_refused() {
     limit(wgpu::Limits::default()).unwrap();
     let small = wgpu::Limits { max_buffer_size: 1 << 20, ..wgpu::Limits::default() };
     assert!(matches!(limit(small), Err(Error::Limits { needed: 16_777_216, available: 1_048_576, .. })));
-    // The smallest picture, and one whose rows are no multiple of what copies want.
-    for (width, height) in [(1, 1), (33, 3)] {
-        let scene = scenes::column(2);
-        let mut upload = PoseUpload::new(device, queue);
-        let poses = upload.write(&scene, &measures::initial_poses(&scene)).unwrap();
-        let mut renderer = Renderer::new(device, Offscreen::FORMAT, &scene).unwrap();
+    // The smallest picture, and those whose rows are no multiple of what copies want: each row of a ball is symmetric.
+    let mut scene = Scene::new();
+    scene.insert(dynamic(Vec3::ZERO), ColliderBuilder::ball(1.0));
+    let mut upload = PoseUpload::new(device, queue);
+    let poses = upload.write(&scene, &measures::initial_poses(&scene)).unwrap();
+    let mut renderer = Renderer::with_samples(device, Offscreen::FORMAT, 1, &scene).unwrap();
+    let camera = camera(Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO);
+    for (width, height) in [(1, 1), (33, 33), (101, 70)] {
         let offscreen = Offscreen::new(device, queue, width, height).unwrap();
-        let camera = camera(Vec3::new(0.0, 2.0, 9.0), Vec3::ZERO);
-        let pixels = offscreen.picture(&mut renderer, &camera, poses, &Style::default()).unwrap();
-        assert_eq!(pixels.len(), (4 * width * height) as usize);
+        let style = Style { colors: &[color(1)], ..PLAIN };
+        let pixels = offscreen.picture(&mut renderer, &camera, poses, &style).unwrap();
+        let rows: Vec<Vec<bool>> = pixels
+            .chunks(4 * width as usize)
+            .map(|row| row.as_chunks::<4>().0.iter().map(|pixel| hue(*pixel) == 1).collect())
+            .collect();
+        assert_eq!(rows.len(), height as usize);
+        assert!(rows.iter().all(|row| row.iter().eq(row.iter().rev())), "{width}x{height}");
+        assert!(rows[height as usize / 2][width as usize / 2] && (width == 1 || !rows[0][0]));
     }
+}
+
+/// Formats that do not encode sRGB themselves, one sample a pixel, and two pictures in one submission.
+#[test]
+fn formats_and_samples_change_edges_alone() {
+    let (device, queue) = (&gpu().device, &gpu().queue);
+    let scene = scenes::mixed(40);
+    let mut upload = PoseUpload::new(device, queue);
+    let poses = upload.write(&scene, &measures::initial_poses(&scene)).unwrap();
+    let style = Style { see_through: true, ..PLAIN };
+    let cameras = [9.0, 11.0].map(|x| camera(Vec3::new(x, 12.0, 9.0), Vec3::Y * 4.0));
+    let expected = cameras.map(|camera| Picture::first(&scene, &camera, &style));
+    for (format, samples) in [
+        (wgpu::TextureFormat::Rgba8UnormSrgb, 1),
+        (wgpu::TextureFormat::Rgba8Unorm, 1),
+        (wgpu::TextureFormat::Rgba8Unorm, 4),
+    ] {
+        let mut renderer = Renderer::with_samples(device, format, samples, &scene).unwrap();
+        let textures = [(); 2].map(|()| texture(format));
+        let mut encoder = device.create_command_encoder(&Default::default());
+        for (camera, texture) in cameras.iter().zip(&textures) {
+            let view = texture.create_view(&Default::default());
+            renderer.draw(&mut encoder, &view, SIZE, camera, poses, &style).unwrap();
+        }
+        queue.submit([encoder.finish()]);
+        for (texture, expected) in textures.iter().zip(&expected) {
+            let differ = read(texture).changed(expected, 12).len();
+            // Of 76,800: pixels with an edge in them, and lines on glass, blended as they are stored. Seen: 3,449 at most.
+            assert!(differ > 100 && differ < 6000, "{differ} with {samples} samples of {format:?}");
+        }
+    }
+}
+
+fn texture(format: wgpu::TextureFormat) -> wgpu::Texture {
+    gpu().device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d { width: SIZE.0, height: SIZE.1, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    })
+}
+
+fn read(texture: &wgpu::Texture) -> Picture {
+    let bytes = 4 * u64::from(SIZE.0 * SIZE.1);
+    let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
+    let buffer = gpu().create_buffer("picture", bytes, usage).unwrap();
+    let mut encoder = gpu().device.create_command_encoder(&Default::default());
+    // 1280 bytes a row: a multiple of 256.
+    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * SIZE.0), rows_per_image: None };
+    let into = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
+    encoder.copy_texture_to_buffer(texture.as_image_copy(), into, texture.size());
+    gpu().queue.submit([encoder.finish()]);
+    Picture::of(&tumble_gpu::readback::read_now(gpu(), &buffer, 0, bytes).unwrap())
 }
 
 /// Oracle: naga.
