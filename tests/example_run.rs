@@ -254,6 +254,8 @@ fn a_path_that_cannot_be_written_costs_no_run() {
         assert!(line.contains("cannot write") && line.contains(path.to_str().unwrap()), "{option}: {line}");
     }
     assert_eq!(std::fs::read_to_string(&file).unwrap(), "kept");
+    let output = run(&["column", "--backend", "cpu", "--frames", file.to_str().unwrap()]);
+    assert!(error_line(&output).contains("it is a file"));
 }
 
 /// Width, height, and red, green and blue of each pixel.

@@ -109,7 +109,7 @@ fn cuboid_color(in: CuboidVertex) -> @location(0) vec4<f32> {
 @fragment
 fn glass_color(in: CuboidVertex) -> @location(0) vec4<f32> {
     let line = edge(in);
-    return vec4<f32>(finish(mix(vec3<f32>(0.75, 0.82, 0.9), vec3<f32>(0.25), line)), mix(0.035, 0.35, line));
+    return vec4<f32>(finish(mix(vec3<f32>(0.75, 0.82, 0.9), vec3<f32>(0.25), line)), mix(0.03, 0.28, line));
 }
 
 struct BallVertex {

@@ -162,7 +162,7 @@ fn shade(color: vec3<f32>, normal: vec3<f32>, position: vec3<f32>, gloss: f32) -
         let half_way = normalize(frame.light + normalize(frame.eye - position));
         shine = gloss * key * pow(max(dot(normal, half_way), 0.0), 40.0);
     }
-    return color * (around + key * vec3<f32>(0.86, 0.82, 0.75)) + vec3<f32>(shine);
+    return color * (around + key * vec3<f32>(0.92, 0.87, 0.79)) + vec3<f32>(shine);
 }
 
 // As the picture stores it: bright parts bend towards white instead of being cut.

@@ -4,6 +4,21 @@
 //! poses that lie on the host, [`PoseUpload`] makes such a buffer. A [`Renderer`] draws into any texture, an
 //! [`Offscreen`] is one that can be read back, a [`Camera`] says from where.
 //!
+//! ```
+//! use tumble_core::{Result, Scene, measures};
+//! use tumble_draw::{Bounds, Camera, Offscreen, PoseUpload, Renderer, Style};
+//!
+//! /// The scene as it was described, 1280 by 720 pixels of four bytes.
+//! fn picture(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<Vec<u8>> {
+//!     let poses = measures::initial_poses(scene);
+//!     let camera = Camera::framing(&Bounds::of(scene, &poses), 0.5, 0.4, 0.6, 16.0 / 9.0);
+//!     let mut renderer = Renderer::new(device, Offscreen::FORMAT, scene)?;
+//!     let mut upload = PoseUpload::new(device, queue);
+//!     let offscreen = Offscreen::new(device, queue, 1280, 720)?;
+//!     offscreen.picture(&mut renderer, &camera, upload.write(scene, &poses)?, &Style::default())
+//! }
+//! ```
+//!
 //! Worlds are not known here: what is handed in is a device, a buffer of [`PoseRecord`](tumble_core::layout::PoseRecord)
 //! and the [`Scene`](tumble_core::Scene) that tells shapes.
 
