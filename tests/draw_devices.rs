@@ -138,3 +138,19 @@ fn all_shaders_translate() {
     }
     assert_eq!(entries, 15);
 }
+
+/// Oracle: Chrome's compiler, which checks that neighbours are compared only where all pixels come by.
+#[test]
+fn all_shaders_pass_tint() {
+    use std::process::Command;
+    if Command::new("tint").arg("--help").output().is_err() {
+        eprintln!("tint is not on PATH: skipped");
+        return;
+    }
+    for (name, text) in tumble_draw::shaders::ALL {
+        let file = tempfile::Builder::new().suffix(".wgsl").tempfile().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        let output = Command::new("tint").args(["--format", "wgsl"]).arg(file.path()).output().unwrap();
+        assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+}
