@@ -2,3 +2,4 @@
 //! and the report made of it.
 
 pub mod record;
+pub mod report;
