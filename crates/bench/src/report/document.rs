@@ -35,18 +35,33 @@ pub(crate) struct Table {
 
 pub(crate) struct Column {
     pub(crate) name: String,
-    /// Numbers stand right.
-    pub(crate) number: bool,
+    pub(crate) kind: Cells,
+}
+
+/// How cells of a column are set.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Cells {
+    /// On one line.
+    Words,
+    /// On one line, to the right.
+    Numbers,
+    /// On as many lines as it takes.
+    Prose,
 }
 
 /// A column of words.
 pub(crate) fn words(name: impl Into<String>) -> Column {
-    Column { name: name.into(), number: false }
+    Column { name: name.into(), kind: Cells::Words }
 }
 
 /// A column of numbers.
 pub(crate) fn numbers(name: impl Into<String>) -> Column {
-    Column { name: name.into(), number: true }
+    Column { name: name.into(), kind: Cells::Numbers }
+}
+
+/// A column of sentences.
+pub(crate) fn prose(name: impl Into<String>) -> Column {
+    Column { name: name.into(), kind: Cells::Prose }
 }
 
 /// A picture, and its files beside the report.

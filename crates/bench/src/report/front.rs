@@ -20,7 +20,9 @@ pub struct Advantage<'a> {
     pub best: Option<Setting<'a>>,
     /// How many times the error of `best` is that of `better`; errors below [`FLOOR`] count as [`FLOOR`].
     pub error_factor: Option<f64>,
-    /// How many times as long the others need for an error no greater; `None` where none of them reaches it.
+    /// The quickest of the others with an error no greater; `None` where none of them reaches it.
+    pub reached: Option<Setting<'a>>,
+    /// How many times as long `reached` takes.
     pub time_factor: Option<f64>,
     /// Whether the errors of the seeds of `better` and `best` overlap, so that other seeds might say otherwise.
     pub overlap: bool,
@@ -54,14 +56,15 @@ pub fn advantage<'a>(one: &'a Curve, others: &[&'a Curve]) -> Option<Advantage<'
     let at = |point: &'a Point| {
         let best = most_accurate(others.iter().copied(), point.ms);
         let factor = best.map(|b| floored(b.point.error) / floored(point.error));
-        let time = quickest(others.iter().copied(), point.error).map(|q| q.point.ms / point.ms);
+        let reached = quickest(others.iter().copied(), point.error);
+        let time = reached.map(|q| q.point.ms / point.ms);
         // Reached in that time: no advantage.
         if factor.is_some_and(|f| f <= 1.0) {
             return None;
         }
         let overlap = best.is_some_and(|b| point.high >= b.point.low);
         let better = Setting { curve: one, point };
-        Some(Advantage { better, best, error_factor: factor, time_factor: time, overlap })
+        Some(Advantage { better, best, error_factor: factor, reached, time_factor: time, overlap })
     };
     let rank = |a: &Advantage| (a.error_factor.unwrap_or(0.0), a.time_factor.unwrap_or(f64::INFINITY));
     one.points.iter().filter_map(at).max_by(|a, b| {

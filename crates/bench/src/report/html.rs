@@ -1,6 +1,6 @@
 //! The report as one page that needs nothing else: pictures and style are within it.
 
-use super::document::{Block, Document, Figure, Table};
+use super::document::{Block, Cells, Document, Figure, Table};
 use super::text::html as escape;
 use std::fmt::Write;
 
@@ -86,15 +86,19 @@ fn table(out: &mut String, table: &Table) {
         "<p class=\"caption\">{caption}</p>\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\">\n\
          <table>\n<thead><tr>"
     );
-    let class = |number: bool| if number { " class=\"number\"" } else { "" };
+    let class = |kind: Cells| match kind {
+        Cells::Words => "",
+        Cells::Numbers => " class=\"number\"",
+        Cells::Prose => " class=\"prose\"",
+    };
     for column in &table.head {
-        let _ = write!(out, "<th scope=\"col\"{}>{}</th>", class(column.number), escape(&column.name));
+        let _ = write!(out, "<th scope=\"col\"{}>{}</th>", class(column.kind), escape(&column.name));
     }
     out.push_str("</tr></thead>\n<tbody>\n");
     for row in &table.rows {
         out.push_str("<tr>");
         for (cell, column) in row.iter().zip(&table.head) {
-            let _ = write!(out, "<td{}>{}</td>", class(column.number), escape(cell));
+            let _ = write!(out, "<td{}>{}</td>", class(column.kind), escape(cell));
         }
         out.push_str("</tr>\n");
     }

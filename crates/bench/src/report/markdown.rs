@@ -1,6 +1,6 @@
 //! The report as Markdown.
 
-use super::document::{Block, Document, Table};
+use super::document::{Block, Cells, Document, Table};
 use super::text::markdown as escape;
 use std::fmt::Write;
 
@@ -33,7 +33,7 @@ pub(crate) fn render(document: &Document) -> String {
 fn table(out: &mut String, table: &Table) {
     let _ = writeln!(out, "{}\n", escape(&table.caption));
     let head: Vec<String> = table.head.iter().map(|c| escape(&c.name)).collect();
-    let rule: Vec<&str> = table.head.iter().map(|c| if c.number { "---:" } else { "---" }).collect();
+    let rule: Vec<&str> = table.head.iter().map(|c| if c.kind == Cells::Numbers { "---:" } else { "---" }).collect();
     let _ = writeln!(out, "| {} |\n|{}|", head.join(" | "), rule.join("|"));
     for row in &table.rows {
         let cells: Vec<String> = row.iter().map(|cell| escape(cell)).collect();

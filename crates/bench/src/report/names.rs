@@ -28,7 +28,7 @@ impl Names {
         let mut settings = HashMap::new();
         let mut many_broadphases = BTreeSet::new();
         for r in records.iter().filter(|r| r.kind != Kind::Device) {
-            if *solvers.entry(&r.engine).or_insert(&r.solver) != r.solver {
+            if !r.solver.is_empty() && *solvers.entry(&r.engine).or_insert(&r.solver) != r.solver {
                 many_solvers.insert(r.engine.clone());
             }
             let setting = (

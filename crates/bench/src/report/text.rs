@@ -81,9 +81,9 @@ pub(crate) fn tick(value: f64, unit: &str) -> String {
         }
     };
     match unit {
-        "m" => {
+        "m" | "rad" | "s" => {
             let (letter, factor) = prefix(value * 1.0001);
-            format!("{} {letter}m", short(value * factor))
+            format!("{} {letter}{unit}", short(value * factor))
         }
         _ => short(value),
     }

@@ -1,15 +1,41 @@
-//! The report: its numbers against formulas, and its page in a real browser.
+//! The report: its numbers against formulas, tables that no run should leave, and its page in a real browser.
 
+mod browser;
+mod hostile;
+mod numbers;
 mod sample;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use tumble_bench::{record, report};
 
-#[test]
-fn a_run_becomes_files() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report");
-    std::fs::create_dir_all(&folder).unwrap();
+/// Writes table and report of the sample, and gives their paths.
+fn sample_in(folder: &Path) -> Vec<PathBuf> {
     let records = sample::table();
-    tumble_bench::record::write(&folder.join("speed_vs_error.csv"), &records).unwrap();
-    let paths = tumble_bench::report::write(&records, &sample::differs(), &folder, "speed_vs_error").unwrap();
-    println!("{paths:#?}");
+    let table = folder.join("speed_vs_error.csv");
+    record::write(&table, &records).unwrap();
+    let records = record::read(&table).unwrap();
+    report::write(&records, &sample::differs(), folder, "speed_vs_error").unwrap()
+}
+
+/// Left in target/tmp for whoever wants to look at it.
+#[test]
+fn the_same_records_give_the_same_bytes() {
+    let one = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report");
+    let two = tempfile::tempdir().unwrap();
+    std::fs::create_dir_all(one.join("speed_vs_error")).unwrap();
+    let stale = one.join("speed_vs_error").join("of-an-earlier-run.svg");
+    std::fs::write(&stale, "").unwrap();
+    let (first, second) = (sample_in(&one), sample_in(two.path()));
+    assert!(!stale.exists(), "a picture of an earlier report is left");
+    assert_eq!(first.len(), second.len());
+    for (a, b) in first.iter().zip(&second) {
+        assert_eq!(a.file_name(), b.file_name());
+        let (left, right) = (std::fs::read(a).unwrap(), std::fs::read(b).unwrap());
+        assert!(left == right, "{} differs", a.display());
+        assert!(left.len() > 1000, "{} is all but empty", a.display());
+    }
+    let overview = first.iter().find(|p| p.ends_with("speed_vs_error/overview.png")).unwrap();
+    // Width and height of a PNG, in its head.
+    let head = std::fs::read(overview).unwrap();
+    assert_eq!(&head[16..24], [0, 0, 4, 176, 0, 0, 3, 32], "1200 by 800");
 }

@@ -31,7 +31,7 @@ const CASES: [Case; 7] = [
 ];
 
 /// A line with the columns that all lines share.
-pub fn line(kind: Kind, case: &str, engine: &str) -> Record {
+pub(crate) fn line(kind: Kind, case: &str, engine: &str) -> Record {
     let adapter = ENGINES.iter().find(|e| e.0 == engine).map_or("", |e| e.1);
     Record {
         kind,
@@ -44,7 +44,7 @@ pub fn line(kind: Kind, case: &str, engine: &str) -> Record {
         substeps: 4,
         seed: 0,
         broadphase: String::new(),
-        solver: String::new(),
+        solver: if engine.starts_with("tumble") { "soft step".into() } else { String::new() },
         threads: 2,
         steps: 240,
         ms_median: None,
@@ -75,7 +75,8 @@ fn case_lines(noise: &mut Noise, out: &mut Vec<Record>, (case, bodies, seeds, er
     for (engine, _, cost, order) in ENGINES {
         let work = cost * (0.05 + f64::from(*bodies) / 1000.0);
         let settings = [1, 2, 4, 8, 16, 32].map(|n| (n, 1.0 / 60.0)).into_iter();
-        let lengths = [(4, 1.0 / 30.0), (4, 1.0 / 120.0), (4, 1.0 / 240.0)].into_iter().filter(|_| *case == "column 20");
+        let lengths =
+            [(4, 1.0 / 30.0), (4, 1.0 / 120.0), (4, 1.0 / 240.0)].into_iter().filter(|_| *case == "column 20");
         for (substeps, dt) in settings.chain(lengths) {
             for seed in 0..(*seeds).max(1) {
                 let ms = work * (0.4 + 0.6 * f64::from(substeps)) * (1.0 + 0.05 * noise.next());
@@ -90,7 +91,7 @@ fn case_lines(noise: &mut Noise, out: &mut Vec<Record>, (case, bodies, seeds, er
                     (r.bodies, r.dt, r.substeps, r.seed) = (*bodies, dt, substeps, seed + 1);
                     (r.ms_median, r.ms_p95) = (Some(ms), Some(ms * 1.3));
                     (r.quantity, r.unit, r.value) = (quantity.to_string(), unit.to_string(), Some(value));
-                    r.solver = if engine.starts_with("tumble") { "soft step".into() } else { String::new() };
+
                     match (*case, engine) {
                         ("pendulum", "tumble cpu" | "tumble gpu") => {
                             (r.outcome, r.value) = (Outcome::Unmodelled, None);
@@ -164,7 +165,7 @@ fn stage_lines(out: &mut Vec<Record>) {
 }
 
 /// The whole table.
-pub fn table() -> Vec<Record> {
+pub(crate) fn table() -> Vec<Record> {
     let mut noise = Noise(7);
     let mut out = Vec::new();
     for case in &CASES {
@@ -179,7 +180,7 @@ pub fn table() -> Vec<Record> {
 }
 
 /// What differs, as a caller says it.
-pub fn differs() -> Vec<(String, String)> {
+pub(crate) fn differs() -> Vec<(String, String)> {
     [
         ("rapier", "Two relaxation sweeps a sub-step; contacts at 30 Hz; sleep off."),
         ("mujoco", "A global Newton solver; contacts are soft by its solref and solimp, at their defaults."),

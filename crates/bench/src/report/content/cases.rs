@@ -1,6 +1,6 @@
 //! Case by case: plots, who reaches which error first, who has which error in rapier's time, and fits.
 
-use super::{Desk, listed, setting, substeps};
+use super::{Desk, listed, setting};
 use crate::report::curve::{Curve, FLOOR, Measure, Point, is_ours, same_dt};
 use crate::report::document::{Block, Column, Section, Table, numbers, words};
 use crate::report::fit::{Fit, power_law};
@@ -28,7 +28,7 @@ pub fn plots(measures: &[Measure]) -> Vec<(&Measure, Plot)> {
 /// The plot over lengths of a step, at equal sub-steps: time is that of as much simulated time as the usual step's.
 fn plot_of_lengths(measure: &Measure) -> Plot {
     let usual = step_length(measure.dt);
-    let title = format!("{}: {}, by length of a step", measure.case, measure.quantity);
+    let title = format!("{}: by length of a step", measure.case);
     let tag = |p: &Point| step_length(p.dt).trim_end_matches(" s").to_string();
     plot_of(measure, title, &measure.lengths, &format!("time a simulated {usual}"), measure.dt, tag)
 }
@@ -60,7 +60,8 @@ fn plot_of(
             })
             .collect(),
     };
-    let unit = if matches!(measure.unit.as_str(), "m" | "1" | "") { "" } else { &measure.unit };
+    // Ticks of the short units bear them.
+    let unit = if matches!(measure.unit.as_str(), "m" | "rad" | "s" | "1" | "") { "" } else { &measure.unit };
     let y_title = if unit.is_empty() { measure.quantity.clone() } else { format!("{}, {unit}", measure.quantity) };
     Plot {
         title,
@@ -99,7 +100,8 @@ fn case(desk: &mut Desk, measures: &[Measure]) -> Result<Vec<Block>, String> {
         figures.push(desk.log_figure(&slug, &plot)?);
         if measure.lengths.iter().any(|c| !c.points.is_empty()) {
             let plot = plot_of_lengths(measure);
-            figures.push(desk.log_figure(&plot.title.clone(), &plot)?);
+            let slug = format!("{} {} by length of a step", measure.case, measure.quantity);
+            figures.push(desk.log_figure(&slug, &plot)?);
         }
     }
     let mut blocks = Vec::new();
@@ -168,7 +170,7 @@ fn in_rapiers_time(measures: &[Measure]) -> Option<Block> {
         let best = most_accurate(curve, budget);
         match (best, curve) {
             (Some(b), _) => {
-                format!("{} ({}, {} ms)", error(b.point.error, &m.unit), substeps(b.point.substeps), number(b.point.ms))
+                format!("{} (n = {}, {} ms)", error(b.point.error, &m.unit), b.point.substeps, number(b.point.ms))
             }
             (None, Some(c)) => {
                 let least = c.points.iter().map(|p| p.ms).fold(f64::INFINITY, f64::min);

@@ -3,7 +3,7 @@
 use super::{Desk, listed};
 use crate::record::{Kind, Outcome, Record};
 use crate::report::curve::{FLOOR, unusable};
-use crate::report::document::{Block, Section, Table, words};
+use crate::report::document::{Block, Cells, Section, Table, numbers, prose, words};
 use crate::report::names::Names;
 use crate::report::text::step_length;
 use std::collections::BTreeSet;
@@ -34,7 +34,7 @@ pub(super) fn run(desk: &mut Desk, overview: &str) -> Section {
         vec!["lines of the table".into(), records.len().to_string()],
     ];
     let mut blocks =
-        vec![Block::Table(Table { caption: "Where and when".into(), head: vec![words("what"), words("value")], rows })];
+        vec![Block::Table(Table { caption: "Where and when".into(), head: vec![words("what"), prose("value")], rows })];
     let mixed = [distinct(records, |r| r.machine.clone()), distinct(records, |r| r.commit.clone())];
     if mixed.iter().any(|values| values.len() > 1) {
         blocks.push(Block::Text(
@@ -57,7 +57,8 @@ pub(super) fn run(desk: &mut Desk, overview: &str) -> Section {
                 of(|r| r.broadphase.clone()),
             ]
         };
-        let head = ["engine", "version", "ran on", "threads", "solvers", "broad phases"].map(words).into();
+        let mut head: Vec<_> = ["engine", "version", "ran on", "threads", "solvers", "broad phases"].map(words).into();
+        head[2].kind = Cells::Prose;
         let rows = engines.iter().map(row).collect();
         blocks.push(Block::Table(Table { caption: "With what".into(), head, rows }));
     }
@@ -71,7 +72,7 @@ pub(super) fn how_to_read(desk: &mut Desk) -> Section {
     let items = [
         "Down and to the left is better: less error, less time. Both axes are logarithmic.".to_string(),
         "A curve joins the settings of one engine in order of sub-steps; its ends say how many. tumble's are thicker. Each \
-         engine keeps its colour and marker."
+         engine keeps its colour and marker. In tables, n = 4 means 4 sub-steps."
             .into(),
         "Times are medians of a step on the host's clock with the result waited for; the whisker to the right ends at the \
          95th percentile. Points are medians over the seeds; the thin upright bar spans all seeds."
@@ -91,7 +92,7 @@ pub(super) fn differences(desk: &mut Desk, differs: &[(String, String)]) -> Sect
     let mut blocks = Vec::new();
     if !differs.is_empty() {
         let rows = differs.iter().map(|(engine, text)| vec![engine.clone(), text.clone()]).collect();
-        let head = vec![words("engine"), words("what differs")];
+        let head = vec![words("engine"), prose("what differs")];
         blocks.push(Block::Table(Table { caption: "Before comparing".into(), head, rows }));
     }
     // One line a note, with the cases that it is about.
@@ -108,7 +109,7 @@ pub(super) fn differences(desk: &mut Desk, differs: &[(String, String)]) -> Sect
     }
     if !notes.is_empty() {
         let rows = notes.into_iter().map(|(engine, note, cases)| vec![engine.into(), note.into(), listed(cases)]);
-        let head = ["engine", "note", "cases"].map(words).into();
+        let head = vec![words("engine"), prose("note"), prose("cases")];
         blocks.push(Block::Table(Table { caption: "Notes of the runs".into(), head, rows: rows.collect() }));
     }
     if blocks.is_empty() {
@@ -168,8 +169,8 @@ pub(super) fn not_measured(desk: &mut Desk) -> Section {
             cells.push(lines.to_string());
             cells
         };
-        let mut head: Vec<_> = ["case", "engine", "outcome", "why", "settings"].map(words).into();
-        head.push(crate::report::document::numbers("lines"));
+        let head =
+            vec![words("case"), words("engine"), words("outcome"), prose("why"), prose("settings"), numbers("lines")];
         let caption = "What has no point in the plots".to_string();
         blocks.push(Block::Table(Table { caption, head, rows: rows.into_iter().map(row).collect() }));
     }

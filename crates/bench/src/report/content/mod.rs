@@ -66,13 +66,9 @@ fn told(plot: &Plot) -> String {
     text
 }
 
-fn substeps(n: u32) -> String {
-    if n == 1 { "1 sub-step".into() } else { format!("{n} sub-steps") }
-}
-
 /// A setting in few words: engine and sub-steps.
 fn setting(label: &str, point: &Point) -> String {
-    format!("{label}, {}", substeps(point.substeps))
+    format!("{label}, n = {}", point.substeps)
 }
 
 /// Names of a list, with commas.

@@ -6,50 +6,37 @@ use crate::report::document::{Block, Section, Table, numbers, words};
 use crate::report::front::{Advantage, advantage};
 use crate::report::scaling::{ScalingCurve, ScalingPoint};
 use crate::report::text::{amount, count, number};
-use std::cmp::Ordering;
 
-/// Whose advantages a table lists.
+/// Whose advantages are listed.
 #[derive(Clone, Copy, PartialEq)]
 enum Side {
     Theirs,
     Ours,
 }
 
-/// One side's greatest advantage in one error of one case, against one engine's curve or against all of tumble.
-struct Row<'a> {
-    measure: &'a Measure,
-    against: String,
-    advantage: Advantage<'a>,
+impl Side {
+    /// Who leads and who is led, in words.
+    fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Theirs => ("another engine", "tumble"),
+            Self::Ours => ("tumble", "the others"),
+        }
+    }
 }
 
-/// By error at equal time, then by time at equal error.
-fn order(a: &Advantage, b: &Advantage) -> Ordering {
-    let key = |a: &Advantage| (a.error_factor.unwrap_or(0.0), a.time_factor.unwrap_or(f64::INFINITY));
-    let (a, b) = (key(a), key(b));
-    a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
-}
-
+/// tumble's curves, and those of the others.
 fn split(measure: &Measure) -> (Vec<&Curve>, Vec<&Curve>) {
     measure.curves.iter().partition(|c| is_ours(&c.engine))
 }
 
-/// Theirs over all of tumble, one for each curve of theirs; or tumble's best over each of theirs.
-fn advantages(measure: &Measure, side: Side) -> Vec<Row<'_>> {
+/// Each curve of one side against all of the other.
+fn advantages(measure: &Measure, side: Side) -> Vec<(&Measure, Advantage<'_>)> {
     let (ours, theirs) = split(measure);
-    if ours.is_empty() {
+    let (ones, others) = if side == Side::Theirs { (theirs, ours) } else { (ours, theirs) };
+    if others.is_empty() {
         return Vec::new();
     }
-    let row = |against: &str, advantage| Row { measure, against: against.to_string(), advantage };
-    match side {
-        Side::Theirs => theirs.iter().filter_map(|one| Some(row("tumble", advantage(one, &ours)?))).collect(),
-        Side::Ours => theirs
-            .iter()
-            .filter_map(|other| {
-                let all = ours.iter().filter_map(|one| advantage(one, &[other]));
-                Some(row(&other.label, all.max_by(order)?))
-            })
-            .collect(),
-    }
+    ones.iter().filter_map(|one| Some((measure, advantage(one, &others)?))).collect()
 }
 
 fn factor(value: f64) -> String {
@@ -61,109 +48,125 @@ fn error(value: f64, unit: &str) -> String {
     if value <= FLOOR { format!("below {}", amount(FLOOR, unit)) } else { amount(value, unit) }
 }
 
-fn table(caption: &str, side: Side, mut rows: Vec<Row>) -> Table {
-    rows.sort_by(|a, b| order(&b.advantage, &a.advantage));
-    let other = if side == Side::Theirs { "tumble" } else { "the other" };
+/// Settings that are more accurate than what the other side has in the same time.
+fn more_accurate(mut rows: Vec<(&Measure, Advantage)>, side: Side) -> Table {
+    let (one, others) = side.words();
+    rows.sort_by(|a, b| b.1.error_factor.unwrap_or(0.0).total_cmp(&a.1.error_factor.unwrap_or(0.0)));
     let head = vec![
         words("case"),
         words("error"),
         words("the better setting"),
         numbers("ms"),
         numbers("its error"),
-        words(format!("{other}'s best in that time")),
+        words(format!("best of {others} in that time")),
         numbers("ms"),
         numbers("its error"),
         numbers("times the error"),
         numbers("times the time, for that error"),
     ];
-    let cells = |row: Row| {
-        let (a, unit) = (row.advantage, &row.measure.unit);
-        let best = match a.best {
-            Some(best) => setting(&best.curve.label, best.point),
-            None => format!("{}: nothing so quick", row.against),
-        };
-        let times = a.error_factor.map(|f| factor(f) + if a.overlap { ", seeds overlap" } else { "" });
+    let cells = |(measure, a): (&Measure, Advantage)| {
+        let unit = &measure.unit;
+        let times = a.error_factor.map_or("–".into(), factor) + if a.overlap { ", seeds overlap" } else { "" };
         vec![
-            row.measure.case.clone(),
-            row.measure.quantity.clone(),
+            measure.case.clone(),
+            measure.quantity.clone(),
             setting(&a.better.curve.label, a.better.point),
             number(a.better.point.ms),
             error(a.better.point.error, unit),
-            best,
+            a.best.map_or("–".into(), |b| setting(&b.curve.label, b.point)),
             a.best.map_or("–".into(), |b| number(b.point.ms)),
             a.best.map_or("–".into(), |b| error(b.point.error, unit)),
-            times.unwrap_or("–".into()),
+            times,
             a.time_factor.map_or("not reached".into(), factor),
         ]
     };
-    Table { caption: caption.into(), head, rows: rows.into_iter().map(cells).collect() }
+    let caption = format!("More accurate and no slower: where {one} leads {others} most, the widest lead first");
+    Table { caption, head, rows: rows.into_iter().map(cells).collect() }
 }
 
-/// The names of the measures that a question is answered with yes, each case once with its errors.
+/// Settings that are quicker than anything that the other side has.
+fn only_quicker(mut rows: Vec<(&Measure, Advantage)>, side: Side) -> Table {
+    let (one, others) = side.words();
+    let key = |a: &Advantage| a.time_factor.unwrap_or(f64::INFINITY);
+    rows.sort_by(|a, b| key(&b.1).total_cmp(&key(&a.1)));
+    let head = vec![
+        words("case"),
+        words("error"),
+        words("the quicker setting"),
+        numbers("ms"),
+        numbers("its error"),
+        words(format!("quickest of {others} to reach that")),
+        numbers("ms"),
+        numbers("times the time"),
+    ];
+    let cells = |(measure, a): (&Measure, Advantage)| {
+        vec![
+            measure.case.clone(),
+            measure.quantity.clone(),
+            setting(&a.better.curve.label, a.better.point),
+            number(a.better.point.ms),
+            error(a.better.point.error, &measure.unit),
+            a.reached.map_or("none".into(), |r| setting(&r.curve.label, r.point)),
+            a.reached.map_or("–".into(), |r| number(r.point.ms)),
+            a.time_factor.map_or("not reached".into(), factor),
+        ]
+    };
+    let caption = format!("Quicker than every setting of {others}: where {one} leads by time alone");
+    Table { caption, head, rows: rows.into_iter().map(cells).collect() }
+}
+
+/// The names of the measures that a question is answered with yes.
 fn named<'a>(measures: &'a [Measure], yes: impl Fn(&'a Measure) -> bool) -> Option<String> {
     let all: Vec<String> = measures.iter().filter(|m| yes(m)).map(|m| format!("{} ({})", m.case, m.quantity)).collect();
     (!all.is_empty()).then(|| listed(all))
 }
 
-pub(super) fn losses(desk: &mut Desk, measures: &[Measure], curves: &[ScalingCurve]) -> Section {
+/// How often a side leads, and by what.
+fn standing(measures: &[Measure], curves: &[ScalingCurve], side: Side) -> Vec<Block> {
+    let (one, others) = side.words();
     let compared = measures.iter().filter(|m| !split(m).0.is_empty() && !split(m).1.is_empty()).count();
-    let rows: Vec<Row> = measures.iter().flat_map(|m| advantages(m, Side::Theirs)).collect();
+    let rows: Vec<(&Measure, Advantage)> = measures.iter().flat_map(|m| advantages(m, side)).collect();
+    let (accurate, quick): (Vec<_>, Vec<_>) = rows.into_iter().partition(|(_, a)| a.best.is_some());
+    let mut led: Vec<(&str, &str)> = accurate.iter().map(|(m, _)| (m.case.as_str(), m.quantity.as_str())).collect();
+    led.dedup();
+    let mut blocks = vec![Block::Text(if compared == 0 {
+        "No case has both tumble and another engine, so nothing can be compared.".into()
+    } else {
+        format!(
+            "{} of {compared} errors of cases in which both were measured, {one} has a setting that is no slower than the \
+             best of {others} in that time, and more accurate.",
+            if led.is_empty() { "In none".to_string() } else { format!("In {}", led.len()) }
+        )
+    })];
+    if !accurate.is_empty() {
+        blocks.push(Block::Table(more_accurate(accurate, side)));
+    }
+    if !quick.is_empty() {
+        blocks.push(Block::Table(only_quicker(quick, side)));
+    }
+    blocks.extend(sizes(curves, side));
+    blocks
+}
+
+pub(super) fn losses(desk: &mut Desk, measures: &[Measure], curves: &[ScalingCurve]) -> Section {
     let mut blocks = Vec::new();
     if let Some(names) = named(measures, |m| split(m).0.is_empty() && !split(m).1.is_empty()) {
         blocks.push(Block::Text(format!("tumble has no value at all, where another engine has one, in: {names}.")));
     }
-    let mut lost: Vec<(&str, &str)> = rows
-        .iter()
-        .filter(|r| r.advantage.best.is_some())
-        .map(|r| (r.measure.case.as_str(), r.measure.quantity.as_str()))
-        .collect();
-    lost.dedup();
-    let quicker = rows.iter().filter(|r| r.advantage.best.is_none()).count();
-    blocks.push(Block::Text(match (compared, rows.len()) {
-        (0, _) => "No case has both tumble and another engine, so nothing can be compared.".into(),
-        (_, 0) => format!("Nowhere among the {} compared.", errors(compared)),
-        _ => format!(
-            "In {} of the {} compared, another engine has a setting that is no slower than tumble's best of equal time \
-             and more accurate. {} below {} only quicker than tumble's quickest.",
-            lost.len(),
-            errors(compared),
-            quicker,
-            if quicker == 1 { "is" } else { "are" }
-        ),
-    }));
-    if !rows.is_empty() {
-        blocks.push(Block::Table(table(
-            "For each engine the setting by which it leads tumble most, the widest lead first",
-            Side::Theirs,
-            rows,
-        )));
-    }
+    blocks.extend(standing(measures, curves, Side::Theirs));
     if let Some(names) = named(measures, |m| split(m).1.is_empty() && !split(m).0.is_empty()) {
         blocks.push(Block::Text(format!("Not compared, as no other engine has a value: {names}.")));
     }
-    blocks.extend(sizes("Bodies at which another engine is quicker than tumble", curves, Side::Theirs));
     desk.section("Where tumble loses", blocks)
 }
 
 pub(super) fn wins(desk: &mut Desk, measures: &[Measure], curves: &[ScalingCurve]) -> Section {
-    let rows: Vec<Row> = measures.iter().flat_map(|m| advantages(m, Side::Ours)).collect();
-    let mut blocks = Vec::new();
-    if rows.is_empty() {
-        blocks.push(Block::Text("No setting of tumble leads another engine in any case.".into()));
-    } else {
-        let caption = "For each engine the setting by which tumble leads it most, the widest lead first";
-        blocks.push(Block::Table(table(caption, Side::Ours, rows)));
-    }
-    blocks.extend(sizes("Bodies at which tumble is quicker than another engine", curves, Side::Ours));
+    let blocks = standing(measures, curves, Side::Ours);
     desk.section("Where tumble wins", blocks)
 }
 
-fn errors(n: usize) -> String {
-    if n == 1 { "1 error of a case".into() } else { format!("{n} errors of cases") }
-}
-
 /// Scene by scene and engine by engine, the number of bodies at which a side's lead in time is greatest.
-fn sizes(caption: &str, curves: &[ScalingCurve], side: Side) -> Option<Block> {
+fn sizes(curves: &[ScalingCurve], side: Side) -> Option<Block> {
     let mut found = Vec::new();
     for theirs in curves.iter().filter(|c| !is_ours(&c.engine)) {
         let ours_at = |bodies: u32| {
@@ -197,12 +200,16 @@ fn sizes(caption: &str, curves: &[ScalingCurve], side: Side) -> Option<Block> {
         words("scene"),
         words("engine"),
         numbers("at sizes"),
-        numbers("bodies, at the widest"),
-        numbers("ms"),
+        numbers("bodies, at the widest lead"),
+        numbers("its ms"),
         words("tumble's quickest"),
         numbers("ms"),
         numbers("factor"),
     ];
+    let caption = match side {
+        Side::Theirs => "Numbers of bodies at which another engine is quicker than tumble",
+        Side::Ours => "Numbers of bodies at which tumble is quicker than another engine",
+    };
     let rows: Vec<Vec<String>> = found.into_iter().map(|(_, cells)| cells).collect();
     (!rows.is_empty()).then(|| Block::Table(Table { caption: caption.into(), head, rows }))
 }

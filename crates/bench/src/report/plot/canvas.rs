@@ -69,9 +69,18 @@ pub(super) fn sheet<T>(
     Ok((svg.replacen(&fine, &shown, 1), drawn))
 }
 
-/// What a line of text takes, px: a guess on the safe side, since no font is at hand. A test in a browser looks.
+/// What a line of text takes, px: after the widths of DejaVu Sans, a wide font, since a page's font is not known here. A
+/// test in a browser looks.
 pub(super) fn text_width(text: &str, size: f64) -> f64 {
-    text.chars().map(|c| if c.is_ascii_lowercase() || c.is_ascii_digit() { 0.56 } else { 0.62 }).sum::<f64>() * size
+    let em = |c: char| match c {
+        'm' | 'w' | 'M' | 'W' => 0.98,
+        'i' | 'j' | 'l' | 'f' | 't' | 'r' | ' ' | '.' | ',' | ':' | '/' | '(' | ')' => 0.41,
+        'a'..='z' | '0'..='9' => 0.64,
+        '!'..='~' => 0.78,
+        // Letters of the world: as wide as they are high at most.
+        _ => 1.0,
+    };
+    text.chars().map(em).sum::<f64>() * size
 }
 
 /// The text, cut where it would pass `width`.

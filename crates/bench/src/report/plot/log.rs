@@ -81,6 +81,12 @@ struct Frame {
     bottom: f64,
 }
 
+impl Frame {
+    fn meets(&self, other: &Frame) -> bool {
+        self.left < other.right && other.left < self.right && self.top < other.bottom && other.top < self.bottom
+    }
+}
+
 /// Draws a plot, wide or narrow; gives the SVG and the points in it, in the order of their curves.
 ///
 /// # Errors
@@ -146,7 +152,7 @@ pub(crate) fn grid(
 }
 
 fn entry_width(curve: &PlotCurve, font: f64) -> f64 {
-    text_width(&curve.label, font) + 44.0
+    text_width(&curve.label, font) + 38.0
 }
 
 /// Places of the entries of a legend: their left ends and rows.
@@ -215,7 +221,7 @@ fn panel(canvas: &Canvas, plot: &Plot, palette: &Palette, frame: Frame) -> Resul
     let labels: Vec<String> = y_ticks.iter().map(|v| tick(*v, &plot.y_unit)).collect();
     let wide = labels.iter().map(|l| text_width(l, font)).fold(font * 2.0, f64::max);
     let (left, right) = (frame.left + wide + 12.0, frame.right - font * 1.3);
-    let (top, foot) = (frame.top + font * 2.3, frame.bottom - font * 3.6);
+    let (top, foot) = (frame.top + font * 2.5, frame.bottom - font * 3.6);
     // The foot lies under the axis, so that what is there is not taken for the axis' least value.
     let bottom = if any_low { foot - font * 1.6 } else { foot };
     let map = |v: f64, (low, high): (f64, f64), from: f64, to: f64| {
@@ -241,11 +247,11 @@ fn panel(canvas: &Canvas, plot: &Plot, palette: &Palette, frame: Frame) -> Resul
         canvas.text("0", (left - 6.0, foot), Hang(HPos::Right, VPos::Center), INK, false)?;
     }
     let y_title = cut(&plot.y_title, font, frame.right - frame.left - 12.0);
-    canvas.text(&y_title, (frame.left + 6.0, frame.top + font * 0.5), Hang(HPos::Left, VPos::Top), MUTED, false)?;
+    canvas.text(&y_title, (frame.left + 6.0, frame.top + font * 0.7), Hang(HPos::Left, VPos::Top), MUTED, false)?;
     let x_title = cut(&plot.x_title, font, right - frame.left - 6.0);
     canvas.text(&x_title, (right, foot + font * 2.0), Hang(HPos::Right, VPos::Top), MUTED, false)?;
 
-    let mut drawn = Vec::new();
+    let (mut drawn, mut ends, mut paths) = (Vec::new(), Vec::new(), Vec::new());
     // tumble's curves last, so that nothing covers them.
     let mut order: Vec<&PlotCurve> = plot.curves.iter().collect();
     order.sort_by_key(|c| is_ours(&c.engine));
@@ -261,7 +267,7 @@ fn panel(canvas: &Canvas, plot: &Plot, palette: &Palette, frame: Frame) -> Resul
             }
         }
         canvas.dashed(&places, colour(place), stroke(&curve.engine), DASHES[curve.variant % DASHES.len()])?;
-        for (i, (point, at)) in curve.points.iter().zip(&places).enumerate() {
+        for (point, at) in curve.points.iter().zip(&places) {
             canvas.marker(*at, place, radius(&curve.engine, font), is_low(point))?;
             drawn.push(Drawn {
                 label: curve.label.clone(),
@@ -270,28 +276,40 @@ fn panel(canvas: &Canvas, plot: &Plot, palette: &Palette, frame: Frame) -> Resul
                 at_foot: is_low(point),
                 place: *at,
             });
-            if let Some(tag) = &point.tag {
-                let (at, hang) = beside(&places, i, font, right);
-                canvas.text(tag, at, hang, MUTED, false)?;
-            }
+        }
+        paths.push(places.clone());
+        ends.extend(curve.points.iter().zip(&places).filter_map(|(p, at)| Some((*at, p.tag.as_deref()?))));
+    }
+    let lines: Vec<Frame> =
+        paths.iter().flat_map(|path| path.windows(2)).flat_map(|w| along(w[0], w[1], font)).collect();
+    let mut taken: Vec<Frame> = drawn.iter().map(|d| around(d.place, font * 0.3, font * 0.3)).collect();
+    for (at, tag) in ends {
+        let (half, tall) = (text_width(tag, font) / 2.0, font * 0.45);
+        let (dx, dy) = (half + font * 0.45, tall + font * 0.4);
+        let beside = [(0.0, -dy), (0.0, dy), (dx, 0.0), (-dx, 0.0), (dx, -dy), (-dx, -dy), (dx, dy), (-dx, dy)];
+        let boxes = beside.map(|(x, y)| around((at.0 + x, at.1 + y), half, tall));
+        let inside = |b: &Frame| b.left > left && b.right < frame.right && b.bottom < foot;
+        let clear = |b: &&Frame| inside(b) && !taken.iter().any(|t| t.meets(b));
+        let quite = |b: &&Frame| clear(b) && !lines.iter().any(|l| l.meets(b));
+        // Where there is no free place, the neighbours' tags tell enough: curves are joined in order.
+        if let Some(&free) = boxes.iter().find(quite).or_else(|| boxes.iter().find(clear)) {
+            let middle = ((free.left + free.right) / 2.0, (free.top + free.bottom) / 2.0);
+            canvas.text(tag, middle, Hang(HPos::Center, VPos::Center), MUTED, false)?;
+            taken.push(free);
         }
     }
     Ok(drawn)
 }
 
-/// Where a point's tag goes: away from its neighbour on the curve.
-fn beside(places: &[(f64, f64)], i: usize, font: f64, right: f64) -> ((f64, f64), Hang) {
-    let at = places[i];
-    let neighbour = if i == 0 { places.get(1) } else { places.get(i - 1) }.copied().unwrap_or((at.0, at.1 + 1.0));
-    let (dx, dy) = (at.0 - neighbour.0, at.1 - neighbour.1);
-    let off = font * 0.6;
-    // There is room for two digits and no more behind the axis' end.
-    if dx.abs() > 1.5 * dy.abs() && (dx < 0.0 || at.0 + off + font * 0.4 < right) {
-        let (x, hang) = if dx < 0.0 { (at.0 - off, HPos::Right) } else { (at.0 + off, HPos::Left) };
-        ((x, at.1), Hang(hang, VPos::Center))
-    } else if dy > 0.0 {
-        ((at.0, at.1 + off), Hang(HPos::Center, VPos::Top))
-    } else {
-        ((at.0, at.1 - off), Hang(HPos::Center, VPos::Bottom))
-    }
+/// Small frames along a line, near enough to each other that no text fits between two.
+fn along(from: (f64, f64), to: (f64, f64), font: f64) -> impl Iterator<Item = Frame> {
+    let parts = ((to.0 - from.0).hypot(to.1 - from.1) / (0.3 * font)).ceil().max(1.0);
+    (0..=parts as usize).map(move |i| {
+        let s = i as f64 / parts;
+        around((from.0 + (to.0 - from.0) * s, from.1 + (to.1 - from.1) * s), 1.0, 1.0)
+    })
+}
+
+fn around(at: (f64, f64), half: f64, tall: f64) -> Frame {
+    Frame { left: at.0 - half, top: at.1 - tall, right: at.0 + half, bottom: at.1 + tall }
 }
