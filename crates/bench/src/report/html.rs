@@ -5,6 +5,8 @@ use super::text::html as escape;
 use std::fmt::Write;
 
 const PAGE: &str = include_str!("page.html");
+/// Letters that a cell of words may have on one line.
+const LONG: usize = 32;
 const STYLE: &str = include_str!("page.css");
 
 pub(crate) fn render(document: &Document) -> String {
@@ -98,7 +100,10 @@ fn table(out: &mut String, table: &Table) {
     for row in &table.rows {
         out.push_str("<tr>");
         for (cell, column) in row.iter().zip(&table.head) {
-            let _ = write!(out, "<td{}>{}</td>", class(column.kind), escape(cell));
+            // Words are few as a rule; where they are not, they may take several lines.
+            let long = column.kind == Cells::Words && cell.chars().count() > LONG;
+            let kind = if long { Cells::Prose } else { column.kind };
+            let _ = write!(out, "<td{}>{}</td>", class(kind), escape(cell));
         }
         out.push_str("</tr>\n");
     }

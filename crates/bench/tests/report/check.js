@@ -54,6 +54,8 @@
     const size = parseFloat(getComputedStyle(text).fontSize);
     if (size < 12) found.small.push(`${size} px: ${told(text)}`);
   }
+  // A page that is wrong everywhere is told of in a few lines.
+  for (const name of ['wide', 'small', 'cut']) found[name] = found[name].slice(0, 8);
   const out = document.createElement('pre');
   out.id = 'findings';
   out.textContent = JSON.stringify(found);

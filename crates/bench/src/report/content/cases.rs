@@ -242,12 +242,13 @@ fn fits(measures: &[Measure]) -> Option<Block> {
         words("engine"),
         numbers("order p in sub-steps"),
         numbers("R²"),
-        words("error"),
+        words("with more sub-steps it"),
         numbers("d log error / d log ms"),
         numbers("R²"),
         numbers("points"),
     ];
-    let caption = "Fits by least squares to the logarithms: error ~ n^−p, and error against time".to_string();
+    let caption =
+        "Fits by least squares to the logarithms: error ~ n⁻ᵖ over n sub-steps, and error against time".to_string();
     (!rows.is_empty()).then(|| Block::Table(Table { caption, head, rows }))
 }
 
@@ -302,7 +303,7 @@ pub(super) fn orders(desk: &mut Desk, measures: &[Measure]) -> Section {
         })
         .collect();
     let mut blocks = vec![Block::Text(format!(
-        "The order p of error ~ n^−p over n sub-steps, of each case's first error. 1 is what halves the error with twice \
+        "The order p of error ~ n⁻ᵖ over n sub-steps, of each case's first error. 1 is what halves the error with twice \
          the sub-steps; within ±{FLAT} it is called flat, below that the error grows. – stands where fewer than three \
          points lie above {FLOOR:e} of the unit."
     ))];

@@ -39,6 +39,27 @@ fn advantages(measure: &Measure, side: Side) -> Vec<(&Measure, Advantage<'_>)> {
     ones.iter().filter_map(|one| Some((measure, advantage(one, &others)?))).collect()
 }
 
+/// The three widest leads by error, as sentences.
+fn widest(rows: &[(&Measure, Advantage)]) -> Vec<String> {
+    let mut order: Vec<&(&Measure, Advantage)> = rows.iter().collect();
+    order.sort_by(|a, b| b.1.error_factor.unwrap_or(0.0).total_cmp(&a.1.error_factor.unwrap_or(0.0)));
+    let sentence = |(measure, a): &(&Measure, Advantage)| {
+        let (best, times) = (a.best?, a.error_factor?);
+        Some(format!(
+            "{}, {}: {} has {} in {} ms; {} has {}, {} times as much.",
+            measure.case,
+            measure.quantity,
+            setting(&a.better.curve.label, a.better.point),
+            error(a.better.point.error, &measure.unit),
+            number(a.better.point.ms),
+            setting(&best.curve.label, best.point),
+            error(best.point.error, &measure.unit),
+            number(times)
+        ))
+    };
+    order.into_iter().filter_map(sentence).take(3).collect()
+}
+
 fn factor(value: f64) -> String {
     format!("{} ×", number(value))
 }
@@ -139,6 +160,7 @@ fn standing(measures: &[Measure], curves: &[ScalingCurve], side: Side) -> Vec<Bl
         )
     })];
     if !accurate.is_empty() {
+        blocks.push(Block::List(widest(&accurate)));
         blocks.push(Block::Table(more_accurate(accurate, side)));
     }
     if !quick.is_empty() {

@@ -6,7 +6,7 @@ use crate::report::document::{Block, Column, Section, Table, numbers, words};
 use crate::report::fit::power_law;
 use crate::report::plot::{Bar, NARROW, Plot, PlotCurve, PlotPoint, WIDE, bars};
 use crate::report::scaling::{ScalingCurve, Stages};
-use crate::report::text::{count, number};
+use crate::report::text::{count, number, tick_count};
 
 fn plot_of(case: &str, curves: &[&ScalingCurve]) -> Plot {
     let curve = |c: &&ScalingCurve| PlotCurve {
@@ -127,8 +127,8 @@ pub(super) fn stage_section(desk: &mut Desk, stages: &[Stages]) -> Result<Sectio
                 let mut parts: Vec<(usize, f64)> =
                     s.stages.iter().filter_map(|(name, ms)| Some((place(name), (*ms)? / whole))).collect();
                 parts.extend(s.rest().filter(|ms| *ms > 0.0).map(|ms| (names.len(), ms / whole)));
-                let step = s.step.map_or("step not timed".into(), |ms| format!("{} ms a step", number(ms)));
-                Bar { title: format!("{}: {step}", title(s)), parts }
+                let step = s.step.map_or("step not timed".into(), |ms| format!("{} ms", number(ms)));
+                Bar { title: format!("{}, {} bodies: {step}", s.label, tick_count(f64::from(s.bodies))), parts }
             };
             let drawn: Vec<Bar> = timed.iter().map(bar).collect();
             let heading = format!("{case}: time by stage");
@@ -140,7 +140,7 @@ pub(super) fn stage_section(desk: &mut Desk, stages: &[Stages]) -> Result<Sectio
         }
         if !untimed.is_empty() {
             tables.push(Block::Text(format!(
-                "{case}: no time by stage of {}; the adapter has no timestamps, or the table says otherwise.",
+                "{case}: the table has no time of any stage of {}. An adapter without timestamps gives none.",
                 listed(untimed.iter().map(|s| title(s)))
             )));
         }

@@ -26,8 +26,8 @@ pub(crate) struct Look {
 
 /// For a column of a wide screen, and for files.
 pub(crate) const WIDE: Look = Look { width: 560.0, height: 400.0, font: 13.0 };
-/// For a phone: at 288 px, what a screen of 320 px leaves it, its text is still above 12 px.
-pub(crate) const NARROW: Look = Look { width: 300.0, height: 300.0, font: 13.0 };
+/// For a phone: at 272 px, what a window of 320 px with a scroll bar leaves it, its text is still above 12 px.
+pub(crate) const NARROW: Look = Look { width: 300.0, height: 300.0, font: 13.5 };
 
 /// How text hangs on its point.
 #[derive(Clone, Copy)]

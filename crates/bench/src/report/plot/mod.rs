@@ -24,7 +24,7 @@ const COLOURS: [RGBColor; 8] = [
     RGBColor(0xE6, 0x9F, 0x00),
     RGBColor(0x56, 0xB4, 0xE9),
     RGBColor(0x8A, 0x6D, 0x3B),
-    RGBColor(0x80, 0x80, 0x80),
+    RGBColor(0x4B, 0x55, 0x63),
 ];
 
 /// The engines that have a colour of their own, in the order of [`COLOURS`].
