@@ -16,7 +16,7 @@ pub(crate) fn render(document: &Document) -> String {
         if !section.sub {
             body.push_str(if open { "</section>\n" } else { "" });
             open = true;
-            let _ = write!(body, "<section aria-labelledby=\"{}\">\n", escape(&section.id));
+            let _ = writeln!(body, "<section aria-labelledby=\"{}\">", escape(&section.id));
         }
         let level = if section.sub { 3 } else { 2 };
         let id = escape(&section.id);

@@ -101,7 +101,7 @@ pub(crate) fn tick_count(value: f64) -> String {
 /// A length of a step as a person writes it: 1/60 s.
 pub(crate) fn step_length(dt: f64) -> String {
     let rate = (1.0 / dt).round();
-    if dt > 0.0 && rate >= 1.0 && rate <= 1e6 && (rate * dt - 1.0).abs() < 1e-4 {
+    if dt > 0.0 && (1.0..=1e6).contains(&rate) && (rate * dt - 1.0).abs() < 1e-4 {
         format!("1/{rate} s")
     } else {
         format!("{} s", number(dt))

@@ -34,6 +34,11 @@ fn the_same_records_give_the_same_bytes() {
         assert!(left == right, "{} differs", a.display());
         assert!(left.len() > 1000, "{} is all but empty", a.display());
     }
+    // Beside the table the two texts, in the folder the pictures, each as SVG and as PNG.
+    let ends = |end: &str| first.iter().filter(|p| p.extension().is_some_and(|e| e == end)).count();
+    let in_folder = first.iter().filter(|p| p.parent().unwrap().ends_with("speed_vs_error")).count();
+    assert_eq!((ends("md"), ends("html")), (1, 1));
+    assert!(ends("svg") > 10 && ends("svg") == ends("png") && in_folder == 2 * ends("svg"));
     let overview = first.iter().find(|p| p.ends_with("speed_vs_error/overview.png")).unwrap();
     // Width and height of a PNG, in its head.
     let head = std::fs::read(overview).unwrap();

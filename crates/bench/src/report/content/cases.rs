@@ -148,7 +148,7 @@ fn front(measure: &Measure) -> Option<Block> {
         numbers("to the quickest"),
     ];
     let caption = format!("{}: who reaches it first", measure.quantity);
-    (!rows.is_empty()).then(|| Block::Table(Table { caption, head, rows }))
+    (!rows.is_empty()).then_some(Block::Table(Table { caption, head, rows }))
 }
 
 /// What each curve reaches in the time that rapier takes with its own settings.
@@ -249,7 +249,7 @@ fn fits(measures: &[Measure]) -> Option<Block> {
     ];
     let caption =
         "Fits by least squares to the logarithms: error ~ n⁻ᵖ over n sub-steps, and error against time".to_string();
-    (!rows.is_empty()).then(|| Block::Table(Table { caption, head, rows }))
+    (!rows.is_empty()).then_some(Block::Table(Table { caption, head, rows }))
 }
 
 /// The points over lengths of a step.
@@ -276,7 +276,7 @@ fn lengths(measure: &Measure) -> Option<Block> {
         numbers(measure.quantity.clone()),
     ];
     let caption = format!("{} at other lengths of a step", measure.quantity);
-    (!rows.is_empty()).then(|| Block::Table(Table { caption, head, rows }))
+    (!rows.is_empty()).then_some(Block::Table(Table { caption, head, rows }))
 }
 
 /// The order of every curve in the headline error of every case, on one sheet.
