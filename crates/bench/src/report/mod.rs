@@ -26,26 +26,19 @@ use crate::record::Record;
 use std::path::{Path, PathBuf};
 
 /// Pixels of a PNG for each pixel of its SVG; the overview has its own size.
-const ZOOM: f32 = 2.0;
+const ZOOM: f32 = 1.5;
 
 /// Writes `NAME.md`, `NAME.html`, and the pictures of both into `NAME/` as SVG and PNG, `overview` among them; returns
 /// their paths. Pictures of an earlier report in `NAME/` that this one has not are removed. Both link to `NAME.csv`, the
 /// table, which is expected beside them. The same records give the same bytes.
 ///
-/// `differs` says of an engine what a reader must know before comparing: engine, text.
-///
 /// # Errors
 /// When `name` is more than letters, digits, `-` and `_`, when a picture cannot be drawn, or a file cannot be written.
-pub fn write(
-    records: &[Record],
-    differs: &[(String, String)],
-    folder: &Path,
-    name: &str,
-) -> Result<Vec<PathBuf>, String> {
+pub fn write(records: &[Record], folder: &Path, name: &str) -> Result<Vec<PathBuf>, String> {
     if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_') {
         return Err(format!("the report's name is {name:?}; it may have letters, digits, - and _ only"));
     }
-    let report = content::report(records, differs, name)?;
+    let report = content::report(records, name)?;
     let pictures = folder.join(name);
     std::fs::create_dir_all(&pictures).map_err(|e| format!("cannot make {}: {e}", pictures.display()))?;
     let mut files = vec![

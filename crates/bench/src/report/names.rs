@@ -21,13 +21,18 @@ pub(crate) struct Names {
     names: Vec<Name>,
 }
 
+/// Whether a line is of an engine's work, and not of a device or a remark.
+pub(crate) fn measured(record: &Record) -> bool {
+    matches!(record.kind, Kind::Case | Kind::Scaling | Kind::Stage)
+}
+
 impl Names {
     pub(crate) fn new(records: &[Record]) -> Self {
         let mut solvers = HashMap::<&str, &str>::new();
         let mut many_solvers = BTreeSet::new();
         let mut settings = HashMap::new();
         let mut many_broadphases = BTreeSet::new();
-        for r in records.iter().filter(|r| r.kind != Kind::Device) {
+        for r in records.iter().filter(|r| measured(r)) {
             if !r.solver.is_empty() && *solvers.entry(&r.engine).or_insert(&r.solver) != r.solver {
                 many_solvers.insert(r.engine.clone());
             }
@@ -40,7 +45,7 @@ impl Names {
             }
         }
         let mut all = Self { many_solvers, many_broadphases, names: Vec::new() };
-        for r in records.iter().filter(|r| r.kind != Kind::Device) {
+        for r in records.iter().filter(|r| measured(r)) {
             let label = all.label(r);
             if !all.names.iter().any(|n| n.label == label) {
                 let variant = all.names.iter().filter(|n| n.engine == r.engine).count();
@@ -57,7 +62,9 @@ impl Names {
             label += &format!(", {}", record.solver);
         }
         let key = (record.kind, record.case.clone(), record.engine.clone(), record.solver.clone());
-        if self.many_broadphases.contains(&key) && !record.broadphase.is_empty() {
+        // What the engine chooses by itself needs no word.
+        let plain = ["", "auto"].contains(&record.broadphase.as_str());
+        if self.many_broadphases.contains(&key) && !plain {
             label += &format!(", {}", record.broadphase);
         }
         label

@@ -58,7 +58,7 @@ fn load(page: &Path, width: u32, dark: bool) -> (String, String) {
 /// Makes the report of these records, and a copy of its page with `script` at its end.
 fn page(folder: &Path, records: &[record::Record], script: &str) -> PathBuf {
     record::write(&folder.join("speed_vs_error.csv"), records).unwrap();
-    let files = report::write(records, &sample::differs(), folder, "speed_vs_error").unwrap();
+    let files = report::write(records, folder, "speed_vs_error").unwrap();
     let html = std::fs::read_to_string(files.iter().find(|f| f.extension().is_some_and(|e| e == "html")).unwrap());
     let head =
         "<script>window.findings = []; addEventListener('error', e => findings.push(String(e.message)));</script>";

@@ -18,7 +18,7 @@ const NAMES: [&str; 6] = [
 pub(crate) fn records() -> Vec<Record> {
     let mut out = Vec::new();
     for name in NAMES {
-        for kind in [Kind::Case, Kind::Scaling, Kind::Stage, Kind::Device] {
+        for kind in [Kind::Case, Kind::Scaling, Kind::Stage, Kind::Device, Kind::Engine] {
             for (n, engine) in [(1, "tumble cpu"), (2, "rapier"), (4, name), (8, name)] {
                 let mut r = sample::line(kind, name, engine);
                 (r.substeps, r.bodies) = (n, 1000 * n);
@@ -43,7 +43,7 @@ pub(crate) fn records() -> Vec<Record> {
 /// Markdown and HTML.
 fn texts(records: &[Record]) -> (String, String) {
     let folder = tempfile::tempdir().unwrap();
-    let paths = report::write(records, &[], folder.path(), "speed_vs_error").unwrap();
+    let paths = report::write(records, folder.path(), "speed_vs_error").unwrap();
     let read = |end: &str| {
         let path: &Path = paths.iter().find(|p| p.to_string_lossy().ends_with(end)).unwrap();
         std::fs::read_to_string(path).unwrap()
@@ -154,7 +154,7 @@ fn hostile_names_are_escaped() {
 fn a_name_that_is_a_path_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["", "../x", "a b", "ü"] {
-        let error = report::write(&[], &[], folder.path(), name).unwrap_err();
+        let error = report::write(&[], folder.path(), name).unwrap_err();
         assert!(error.contains("letters, digits"), "{error}");
     }
 }

@@ -14,7 +14,7 @@ fn sample_in(folder: &Path) -> Vec<PathBuf> {
     let table = folder.join("speed_vs_error.csv");
     record::write(&table, &records).unwrap();
     let records = record::read(&table).unwrap();
-    report::write(&records, &sample::differs(), folder, "speed_vs_error").unwrap()
+    report::write(&records, folder, "speed_vs_error").unwrap()
 }
 
 /// Left in target/tmp for whoever wants to look at it.

@@ -84,8 +84,13 @@ fn curves_part_by_solver_and_by_broadphase_only_where_they_differ() {
     // Another broad phase at another setting is the engine's own choice, not another curve.
     table.push(line("rapier", 2, 1, 1.0, 0.1));
     table[5].broadphase = "tree".into();
+    // A broad phase that was asked for, beside the engine's own choice.
+    table.push(line("nexus", 1, 1, 1.0, 0.1));
+    table.push(line("nexus", 1, 1, 1.0, 0.1));
+    (table[6].broadphase, table[7].broadphase) = ("auto".into(), "grid".into());
     let labels: Vec<String> = measures(&table)[0].curves.iter().map(|c| c.label.clone()).collect();
-    assert_eq!(labels, ["tumble cpu, soft step", "tumble cpu, another", "rapier", "box3d, grid", "box3d, tree"]);
+    let ours = ["tumble cpu, soft step", "tumble cpu, another"];
+    assert_eq!(labels, [ours.as_slice(), &["rapier", "box3d, grid", "box3d, tree", "nexus", "nexus, grid"]].concat());
 }
 
 #[test]

@@ -43,7 +43,7 @@ pub(crate) fn line(kind: Kind, case: &str, engine: &str) -> Record {
         dt: 1.0 / 60.0,
         substeps: 4,
         seed: 0,
-        broadphase: String::new(),
+        broadphase: if engine.starts_with("tumble") { "auto".into() } else { String::new() },
         solver: if engine.starts_with("tumble") { "soft step".into() } else { String::new() },
         threads: 2,
         steps: 240,
@@ -173,18 +173,25 @@ pub(crate) fn table() -> Vec<Record> {
     }
     scaling_lines(&mut noise, &mut out);
     stage_lines(&mut out);
+    remark_lines(&mut out);
     let mut device = line(Kind::Device, "llvmpipe (LLVM 15.0.6, 256 bits), Mesa 22.3.6", "tumble gpu");
     (device.quantity, device.unit, device.value) = ("copy bandwidth".into(), "GB/s".into(), Some(9.4));
     out.push(device);
     out
 }
 
-/// What differs, as a caller says it.
-pub(crate) fn differs() -> Vec<(String, String)> {
-    [
+/// What engines say of themselves.
+fn remark_lines(out: &mut Vec<Record>) {
+    for (engine, note) in [
+        ("all", "Same shapes, masses and friction; sleep off; nothing tuned."),
         ("rapier", "Two relaxation sweeps a sub-step; contacts at 30 Hz; sleep off."),
         ("mujoco", "A global Newton solver; contacts are soft by its solref and solimp, at their defaults."),
-    ]
-    .map(|(engine, text)| (engine.to_string(), text.to_string()))
-    .into()
+    ] {
+        let mut r = line(Kind::Engine, "", engine);
+        r.note = note.into();
+        out.push(r);
+    }
+    let mut r = line(Kind::Engine, "", "mujoco stiff");
+    (r.outcome, r.note) = (Outcome::Unmodelled, "not run: the wheel is not installed".into());
+    out.push(r);
 }

@@ -1,6 +1,7 @@
 //! Case by case: plots, who reaches which error first, who has which error in rapier's time, and fits.
 
 use super::{Desk, listed, setting};
+use crate::cases;
 use crate::report::curve::{Curve, FLOOR, Measure, Point, is_ours, same_dt};
 use crate::report::document::{Block, Column, Section, Table, numbers, words};
 use crate::report::fit::{Fit, power_law};
@@ -83,9 +84,19 @@ pub(super) fn sections(desk: &mut Desk, measures: &[Measure]) -> Result<Vec<Sect
     for of_case in measures.chunk_by(|a, b| a.case == b.case) {
         let id = desk.anchors.make(&format!("case-{}", of_case[0].case));
         let title = of_case[0].case.clone();
-        all.push(Section { id, title, sub: true, blocks: case(desk, of_case)? });
+        let mut blocks = Vec::new();
+        // What the case shows stands with the cases, not in the table.
+        blocks.extend(cases::ALL.iter().find(|c| c.name == title).map(|c| Block::Text(sentence(c.about))));
+        blocks.extend(case(desk, of_case)?);
+        all.push(Section { id, title, sub: true, blocks });
     }
     Ok(all)
+}
+
+/// With a capital letter and a full stop.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| format!("{}{}.", first.to_uppercase(), letters.as_str()))
 }
 
 fn case(desk: &mut Desk, measures: &[Measure]) -> Result<Vec<Block>, String> {

@@ -4,7 +4,7 @@ use super::{Desk, listed};
 use crate::record::{Kind, Outcome, Record};
 use crate::report::curve::{FLOOR, unusable};
 use crate::report::document::{Block, Cells, Section, Table, numbers, prose, words};
-use crate::report::names::Names;
+use crate::report::names::{Names, measured};
 use crate::report::text::step_length;
 use std::collections::BTreeSet;
 
@@ -41,7 +41,7 @@ pub(super) fn run(desk: &mut Desk, overview: &str) -> Section {
             "The table mixes machines or commits: times of different ones cannot be compared.".into(),
         ));
     }
-    let engines = distinct(records, |r| r.engine.clone());
+    let engines = distinct(records.iter().filter(|r| measured(r)), |r| r.engine.clone());
     if !engines.is_empty() {
         let row = |engine: &String| {
             let of = |column: fn(&Record) -> String| {
@@ -88,16 +88,29 @@ pub(super) fn how_to_read(desk: &mut Desk) -> Section {
     desk.section("How to read this", vec![Block::List(items.into())])
 }
 
-pub(super) fn differences(desk: &mut Desk, differs: &[(String, String)]) -> Section {
+pub(super) fn differences(desk: &mut Desk) -> Section {
     let mut blocks = Vec::new();
+    let mut differs = Vec::<Vec<String>>::new();
+    for r in desk.records.iter().filter(|r| r.kind == Kind::Engine && r.outcome == Outcome::Done) {
+        let row = vec![r.engine.clone(), r.note.clone()];
+        if !r.note.is_empty() && !differs.contains(&row) {
+            differs.push(row);
+        }
+    }
     if !differs.is_empty() {
-        let rows = differs.iter().map(|(engine, text)| vec![engine.clone(), text.clone()]).collect();
+        // An engine's lines lie together, in the order of their first.
+        let mut rows = Vec::new();
+        while let Some(first) = differs.first().cloned() {
+            let (same, others) = differs.into_iter().partition(|row| row[0] == first[0]);
+            rows.extend::<Vec<_>>(same);
+            differs = others;
+        }
         let head = vec![words("engine"), prose("what differs")];
         blocks.push(Block::Table(Table { caption: "Before comparing".into(), head, rows }));
     }
     // One line a note, with the cases that it is about.
     let mut notes = Vec::<(&str, &str, Vec<String>)>::new();
-    for r in desk.records.iter().filter(|r| r.outcome == Outcome::Done && !r.note.is_empty()) {
+    for r in desk.records.iter().filter(|r| measured(r) && r.outcome == Outcome::Done && !r.note.is_empty()) {
         let at = notes.iter().position(|(engine, note, _)| *engine == r.engine && *note == r.note);
         let at = at.unwrap_or_else(|| {
             notes.push((&r.engine, &r.note, Vec::new()));
@@ -141,8 +154,10 @@ pub(super) fn not_measured(desk: &mut Desk) -> Section {
     let mut rows = Vec::<(Vec<String>, String, BTreeSet<(u32, String)>, usize)>::new();
     for r in desk.records {
         let Some(why) = missing(r) else { continue };
-        let of = vec![r.case.clone(), names.label(r), outcome(r).to_string()];
+        let case = if r.kind == Kind::Engine { "everything".to_string() } else { r.case.clone() };
+        let of = vec![case, names.label(r), outcome(r).to_string()];
         let setting = match r.kind {
+            Kind::Engine => (0, "all".into()),
             Kind::Case => (r.substeps, format!("{} × {}", r.substeps, step_length(r.dt))),
             _ => (r.bodies, format!("{} bodies", r.bodies)),
         };

@@ -9,6 +9,7 @@ pub use cases::plots;
 
 use super::curve::{Point, measures};
 use super::document::{Block, Document, Figure, Section};
+use super::names::measured;
 use super::plot::{Look, Palette, Plot, grid, plot};
 use super::text::{Slugs, amount};
 use super::{ZOOM, scaling, stages};
@@ -76,8 +77,8 @@ fn listed(names: impl IntoIterator<Item = String>) -> String {
     names.into_iter().collect::<Vec<_>>().join(", ")
 }
 
-pub(super) fn report(records: &[Record], differs: &[(String, String)], name: &str) -> Result<Report, String> {
-    let palette = Palette::new(records.iter().map(|r| r.engine.as_str()));
+pub(super) fn report(records: &[Record], name: &str) -> Result<Report, String> {
+    let palette = Palette::new(records.iter().filter(|r| measured(r)).map(|r| r.engine.as_str()));
     let mut desk =
         Desk { records, name, palette, files: Slugs::default(), anchors: Slugs::default(), pictures: Vec::new() };
     let measures = measures(records);
@@ -104,7 +105,7 @@ pub(super) fn report(records: &[Record], differs: &[(String, String)], name: &st
     sections.push(steps::scaling_section(&mut desk, &curves)?);
     sections.push(steps::stage_section(&mut desk, &stages)?);
     sections.push(steps::rate_section(&mut desk, &curves));
-    sections.push(facts::differences(&mut desk, differs));
+    sections.push(facts::differences(&mut desk));
     sections.push(facts::not_measured(&mut desk));
     let lead = if records.is_empty() {
         "The table of this report is empty: nothing was measured.".to_string()

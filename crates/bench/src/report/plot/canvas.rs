@@ -66,7 +66,8 @@ pub(super) fn sheet<T>(
     drop(area);
     // The sheet is finer than pixels only within: it is shown at its size.
     let (fine, shown) = (format!("width=\"{w}\" height=\"{h}\""), format!("width=\"{width}\" height=\"{height}\""));
-    Ok((svg.replacen(&fine, &shown, 1), drawn))
+    // A third of the attributes say what holds anyway.
+    Ok((svg.replacen(&fine, &shown, 1).replace(" opacity=\"1\"", ""), drawn))
 }
 
 /// What a line of text takes, px: after the widths of DejaVu Sans, a wide font, since a page's font is not known here. A

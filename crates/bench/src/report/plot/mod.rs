@@ -28,7 +28,7 @@ const COLOURS: [RGBColor; 8] = [
 ];
 
 /// The engines that have a colour of their own, in the order of [`COLOURS`].
-const KNOWN: [&str; 6] = ["tumble cpu", "tumble gpu", "rapier", "box3d", "nexus", "mujoco"];
+const KNOWN: [&str; 7] = ["tumble cpu", "tumble gpu", "rapier", "box3d", "nexus", "mujoco", "mujoco stiff"];
 
 /// Which engine has which colour and marker, the same in every picture of a report.
 #[derive(Debug, Clone)]
