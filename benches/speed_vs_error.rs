@@ -144,6 +144,10 @@ fn run(args: &Args) -> Result<bool, String> {
     if !args.report {
         measure(args, machine, &mut table)?;
     }
+    let written = tumble_bench::report::write(&table.records, &folder, NAME)?;
+    for path in written.iter().filter(|path| path.extension().is_some_and(|kind| kind == "html" || kind == "md")) {
+        println!("wrote {}", path.display());
+    }
     println!("wrote {}", table.path.display());
     let failed: Vec<_> = table.records.iter().filter(|r| r.outcome == Outcome::Failed).collect();
     for r in &failed {
