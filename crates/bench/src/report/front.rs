@@ -2,6 +2,9 @@
 
 use super::curve::{Curve, FLOOR, Point};
 
+/// Errors and times that differ by a smaller factor than this count as equal: the report's three digits do not show it.
+pub const LEAD: f64 = 1.01;
+
 /// A point and the curve that it is on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting<'a> {
@@ -16,7 +19,8 @@ pub struct Setting<'a> {
 pub struct Advantage<'a> {
     /// The setting that is not reached.
     pub better: Setting<'a>,
-    /// The most accurate of the others in no more time; `None` where none is so quick.
+    /// The most accurate of the others in no more time. Where none is so quick: the most accurate at all if
+    /// none reaches the error either, and `None` if one does.
     pub best: Option<Setting<'a>>,
     /// How many times the error of `best` is that of `better`; errors below [`FLOOR`] count as [`FLOOR`].
     pub error_factor: Option<f64>,
@@ -51,15 +55,16 @@ pub fn most_accurate<'a>(curves: impl IntoIterator<Item = &'a Curve>, ms: f64) -
 }
 
 /// Where `one` has the greatest advantage over all of `others`, by error at equal time and then by time at equal error;
-/// `None` where `others` reach each of its points: no slower, and no less accurate.
+/// `None` where `others` reach each of its points: no slower, and no less accurate, to within [`LEAD`].
 pub fn advantage<'a>(one: &'a Curve, others: &[&'a Curve]) -> Option<Advantage<'a>> {
     let at = |point: &'a Point| {
-        let best = most_accurate(others.iter().copied(), point.ms);
+        let reached = quickest(others.iter().copied(), floored(point.error) * LEAD);
+        let all_led = || if reached.is_none() { most_accurate(others.iter().copied(), f64::INFINITY) } else { None };
+        let best = most_accurate(others.iter().copied(), point.ms).or_else(all_led);
         let factor = best.map(|b| floored(b.point.error) / floored(point.error));
-        let reached = quickest(others.iter().copied(), point.error);
         let time = reached.map(|q| q.point.ms / point.ms);
         // Reached in that time: no advantage.
-        if factor.is_some_and(|f| f <= 1.0) {
+        if factor.or(time).is_some_and(|f| f <= LEAD) {
             return None;
         }
         let overlap = best.is_some_and(|b| point.high >= b.point.low);

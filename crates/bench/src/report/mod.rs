@@ -18,7 +18,7 @@ mod text;
 pub use content::plots;
 pub use curve::{Curve, FLOOR, Measure, Point, is_ours, measures};
 pub use fit::{Fit, power_law};
-pub use front::{Advantage, Setting, advantage, levels, most_accurate, quickest};
+pub use front::{Advantage, LEAD, Setting, advantage, levels, most_accurate, quickest};
 pub use plot::{Drawn, Palette, Plot, PlotCurve, PlotPoint, plot};
 pub use scaling::{ScalingCurve, ScalingPoint, Stages, scaling, stages};
 

@@ -3,7 +3,7 @@
 use crate::record::{Kind, Record};
 use std::collections::{BTreeSet, HashMap};
 
-/// A label, in the order in which the table brings them.
+/// A label. Engines, and the labels of one, are in the order in which the table brings them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Name {
     pub(crate) engine: String,
@@ -52,6 +52,14 @@ impl Names {
                 all.names.push(Name { engine: r.engine.clone(), label, variant });
             }
         }
+        // Those of one engine lie together.
+        let mut engines = Vec::<String>::new();
+        for name in &all.names {
+            if !engines.contains(&name.engine) {
+                engines.push(name.engine.clone());
+            }
+        }
+        all.names.sort_by_key(|name| engines.iter().position(|e| *e == name.engine));
         all
     }
 

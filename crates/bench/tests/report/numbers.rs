@@ -4,7 +4,7 @@ use crate::sample;
 use std::collections::BTreeSet;
 use tumble_bench::record::{Kind, Outcome, Record};
 use tumble_bench::report::{
-    Curve, FLOOR, Palette, Point, advantage, levels, measures, most_accurate, plot, plots, power_law, quickest,
+    Curve, FLOOR, LEAD, Palette, Point, advantage, levels, measures, most_accurate, plot, plots, power_law, quickest,
     scaling, stages,
 };
 
@@ -169,9 +169,18 @@ fn domination_on_cases_made_by_hand() {
     let c = curve("c", &[(0.25, 0.1)]);
     let found = advantage(&c, &[&ours]).unwrap();
     assert_eq!((found.best, found.error_factor, found.time_factor), (None, None, Some(4.0)));
+    // Quicker than anything of tumble's, and more accurate than all of it: compared with its most accurate.
+    let e = curve("e", &[(0.5, 0.001)]);
+    let found = advantage(&e, &[&ours]).unwrap();
+    assert_eq!((found.best.unwrap().point.ms, found.reached), (4.0, None));
+    assert!((found.error_factor.unwrap() - 20.0).abs() < 1e-9);
     // The other way around: tumble leads c by five at its last point.
     let found = advantage(&ours, &[&c]).unwrap();
     assert!((found.error_factor.unwrap() - 5.0).abs() < 1e-12 && found.better.point.ms == 4.0);
+    // Too little to be called a lead, by error and by time; and just enough.
+    let led = |points: &[(f64, f64)]| advantage(&curve("d", points), &[&ours]).is_some();
+    assert!(!led(&[(1.0, 0.0995)]) && led(&[(1.0, 0.0985)]));
+    assert!(!led(&[(0.995, 0.1)]) && led(&[(0.985, 0.1)]));
     // Below the floor all is the same.
     let zero = curve("zero", &[(1.0, 0.0)]);
     assert_eq!(advantage(&zero, &[&curve("tiny", &[(1.0, 1e-12)])]), None);
@@ -186,8 +195,12 @@ fn domination_agrees_with_a_search_over_all_pairs() {
         for one in &measure.curves {
             for other in measure.curves.iter().filter(|c| *c != one) {
                 let floored = |p: &Point| p.error.max(FLOOR);
-                let dominates = |a: &Point, b: &Point| a.ms <= b.ms && floored(a) <= floored(b);
-                let free = one.points.iter().any(|p| !other.points.iter().any(|q| dominates(q, p)));
+                // As quick and as accurate; or, where nothing is as quick, within the margin.
+                let reaches = |a: &Point, b: &Point| {
+                    let quick = other.points.iter().any(|p| p.ms <= b.ms);
+                    a.ms <= b.ms * if quick { 1.0 } else { LEAD } && floored(a) <= floored(b) * LEAD
+                };
+                let free = one.points.iter().any(|p| !other.points.iter().any(|q| reaches(q, p)));
                 assert_eq!(advantage(one, &[other]).is_some(), free, "{} over {}", one.label, other.label);
             }
         }

@@ -5,7 +5,7 @@ use crate::record::{Kind, Outcome, Record};
 use crate::report::curve::{FLOOR, unusable};
 use crate::report::document::{Block, Cells, Section, Table, numbers, prose, words};
 use crate::report::names::{Names, measured};
-use crate::report::text::step_length;
+use crate::report::text::{count, step_length};
 use std::collections::BTreeSet;
 
 /// The different values of a column, in the table's order, without the empty.
@@ -45,7 +45,7 @@ pub(super) fn run(desk: &mut Desk, overview: &str) -> Section {
     if !engines.is_empty() {
         let row = |engine: &String| {
             let of = |column: fn(&Record) -> String| {
-                let values = distinct(records.iter().filter(|r| r.engine == *engine), column);
+                let values = distinct(records.iter().filter(|r| measured(r) && r.engine == *engine), column);
                 if values.is_empty() { "–".into() } else { listed(values) }
             };
             vec![
@@ -82,7 +82,7 @@ pub(super) fn how_to_read(desk: &mut Desk) -> Section {
         ),
         "Every error is better when smaller. Comparisons use measured points only, never a line between two.".into(),
         "No slower and more accurate: where one engine's setting takes no more time than another's best and has the \
-         smaller error. Where the ranges of their seeds overlap, the table says so."
+         smaller error, by at least 1 %. Where the ranges of their seeds overlap, the table says so."
             .into(),
     ];
     desk.section("How to read this", vec![Block::List(items.into())])
@@ -149,17 +149,28 @@ fn missing(record: &Record) -> Option<String> {
     }
 }
 
+/// Settings as text: the numbers of one kind together, as 1, 2, 4 sub-steps of 1/60 s.
+fn told(settings: BTreeSet<(String, u32)>) -> String {
+    let all: Vec<(String, u32)> = settings.into_iter().collect();
+    let group = |of: &[(String, u32)]| {
+        let numbers: Vec<String> = of.iter().filter(|s| s.1 > 0).map(|s| count(u64::from(s.1))).collect();
+        format!("{} {}", numbers.join(", "), of[0].0).trim().to_string()
+    };
+    all.chunk_by(|a, b| a.0 == b.0).map(group).collect::<Vec<_>>().join("; ")
+}
+
 pub(super) fn not_measured(desk: &mut Desk) -> Section {
     let names = Names::new(desk.records);
-    let mut rows = Vec::<(Vec<String>, String, BTreeSet<(u32, String)>, usize)>::new();
+    let mut rows = Vec::<(Vec<String>, String, BTreeSet<(String, u32)>, usize)>::new();
     for r in desk.records {
         let Some(why) = missing(r) else { continue };
         let case = if r.kind == Kind::Engine { "everything".to_string() } else { r.case.clone() };
         let of = vec![case, names.label(r), outcome(r).to_string()];
+        // Numbers that go together, and what they are.
         let setting = match r.kind {
-            Kind::Engine => (0, "all".into()),
-            Kind::Case => (r.substeps, format!("{} × {}", r.substeps, step_length(r.dt))),
-            _ => (r.bodies, format!("{} bodies", r.bodies)),
+            Kind::Engine => ("all".to_string(), 0),
+            Kind::Case => (format!("sub-steps of {}", step_length(r.dt)), r.substeps),
+            _ => ("bodies".into(), r.bodies),
         };
         match rows.iter_mut().find(|row| row.0 == of && row.1 == why) {
             Some(row) => {
@@ -177,16 +188,16 @@ pub(super) fn not_measured(desk: &mut Desk) -> Section {
             "Every line of the table has its number.".into()
         }));
     } else {
-        let row = |(of, why, settings, lines): (Vec<String>, String, BTreeSet<(u32, String)>, usize)| {
+        let row = |(of, why, settings, lines): (Vec<String>, String, BTreeSet<(String, u32)>, usize)| {
             let mut cells = of;
             cells.push(if why.is_empty() { "not said".into() } else { why });
-            cells.push(listed(settings.into_iter().map(|(_, text)| text)));
+            cells.push(told(settings));
             cells.push(lines.to_string());
             cells
         };
         let head =
             vec![words("case"), words("engine"), words("outcome"), prose("why"), prose("settings"), numbers("lines")];
-        let caption = "What has no point in the plots".to_string();
+        let caption = "Runs that left no number, or were cut short".to_string();
         blocks.push(Block::Table(Table { caption, head, rows: rows.into_iter().map(row).collect() }));
     }
     desk.section("Not measured, and why", blocks)

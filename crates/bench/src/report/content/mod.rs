@@ -15,8 +15,9 @@ use super::text::{Slugs, amount};
 use super::{ZOOM, scaling, stages};
 use crate::record::Record;
 
-/// Pictures of the overview, at most.
-const OVERVIEW: usize = 6;
+/// Cases of the overview: a formula, soft stacks, high ratios of mass, a large wall, a heap. Where the table lacks one, the
+/// next of its own takes the place.
+const OVERVIEW: [&str; 6] = ["sliding box", "column 20", "ratio 1000", "topped pyramid", "pyramid 100", "pile 1000"];
 
 /// The document, and every picture as path without its ending, SVG, and pixels a pixel.
 pub(super) struct Report {
@@ -69,7 +70,7 @@ fn told(plot: &Plot) -> String {
 
 /// A setting in few words: engine and sub-steps.
 fn setting(label: &str, point: &Point) -> String {
-    format!("{label}, n = {}", point.substeps)
+    format!("{label}, n\u{a0}=\u{a0}{}", point.substeps)
 }
 
 /// Names of a list, with commas.
@@ -85,13 +86,15 @@ pub(super) fn report(records: &[Record], name: &str) -> Result<Report, String> {
     let curves = scaling(records);
     let stages = stages(records);
 
-    let overview: Vec<Plot> =
+    let mut overview: Vec<Plot> =
         plots(&measures).into_iter().filter(|(m, p)| m.headline && !p.curves.is_empty()).map(|(_, p)| p).collect();
-    let overview = &overview[..overview.len().min(OVERVIEW)];
+    // The title of a headline's plot is its case; sorting keeps the table's order among the others.
+    overview.sort_by_key(|p| OVERVIEW.iter().position(|name| *name == p.title).unwrap_or(OVERVIEW.len()));
+    overview.truncate(OVERVIEW.len());
     let stem = format!("{name}/{}", desk.files.make("overview"));
     let look = Look { width: 1200.0, height: 800.0, font: 17.0 };
     let columns = if overview.len() == 4 { 2 } else { 3 };
-    let (svg, _) = grid(overview, &desk.palette, columns, look)?;
+    let (svg, _) = grid(&overview, &desk.palette, columns, look)?;
     desk.pictures.push((stem.clone(), svg, 1.0));
 
     let mut sections = vec![

@@ -29,14 +29,21 @@ fn split(measure: &Measure) -> (Vec<&Curve>, Vec<&Curve>) {
     measure.curves.iter().partition(|c| is_ours(&c.engine))
 }
 
-/// Each curve of one side against all of the other.
+/// Each curve of theirs against all of tumble's; or the best of tumble's, which are one engine, against all of theirs.
 fn advantages(measure: &Measure, side: Side) -> Vec<(&Measure, Advantage<'_>)> {
     let (ours, theirs) = split(measure);
     let (ones, others) = if side == Side::Theirs { (theirs, ours) } else { (ours, theirs) };
     if others.is_empty() {
         return Vec::new();
     }
-    ones.iter().filter_map(|one| Some((measure, advantage(one, &others)?))).collect()
+    let mut all: Vec<_> = ones.iter().filter_map(|one| Some((measure, advantage(one, &others)?))).collect();
+    if side == Side::Ours {
+        // The widest first; of equals the quickest.
+        let key = |a: &Advantage| (a.error_factor.unwrap_or(0.0), -a.better.point.ms);
+        all.sort_by(|(_, a), (_, b)| key(b).0.total_cmp(&key(a).0).then(key(b).1.total_cmp(&key(a).1)));
+        all.truncate(1);
+    }
+    all
 }
 
 /// The three widest leads by error, as sentences.
@@ -46,7 +53,7 @@ fn widest(rows: &[(&Measure, Advantage)]) -> Vec<String> {
     let sentence = |(measure, a): &(&Measure, Advantage)| {
         let (best, times) = (a.best?, a.error_factor?);
         Some(format!(
-            "{}, {}: {} has {} in {} ms; {} has {}, {} times as much.",
+            "{}, {}: {} has {} in {} ms; {} has {} in {} ms, {} times as much.",
             measure.case,
             measure.quantity,
             setting(&a.better.curve.label, a.better.point),
@@ -54,6 +61,7 @@ fn widest(rows: &[(&Measure, Advantage)]) -> Vec<String> {
             number(a.better.point.ms),
             setting(&best.curve.label, best.point),
             error(best.point.error, &measure.unit),
+            number(best.point.ms),
             number(times)
         ))
     };
@@ -94,7 +102,10 @@ fn more_accurate(mut rows: Vec<(&Measure, Advantage)>, side: Side) -> Table {
             setting(&a.better.curve.label, a.better.point),
             number(a.better.point.ms),
             error(a.better.point.error, unit),
-            a.best.map_or("–".into(), |b| setting(&b.curve.label, b.point)),
+            a.best.map_or("–".into(), |b| {
+                let slower = if b.point.ms > a.better.point.ms { " (slower)" } else { "" };
+                setting(&b.curve.label, b.point) + slower
+            }),
             a.best.map_or("–".into(), |b| number(b.point.ms)),
             a.best.map_or("–".into(), |b| error(b.point.error, unit)),
             times,

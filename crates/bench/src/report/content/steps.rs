@@ -26,7 +26,7 @@ fn plot_of(case: &str, curves: &[&ScalingCurve]) -> Plot {
             .collect(),
     };
     Plot {
-        title: format!("{case}: time against bodies"),
+        title: case.into(),
         x_title: "bodies".into(),
         y_title: "time a step, ms".into(),
         y_unit: String::new(),
