@@ -28,6 +28,8 @@ pub enum Outcome {
     Done,
     /// Given up at the limit of time; its time a step stands, its error is unknown.
     Slow,
+    /// What should stand has fallen: the headline tells how far, this error of what lies there means nothing.
+    Fell,
     /// The engine has no means for what the case needs.
     Unmodelled,
     /// A state that is not finite, a lost contact, or an error of the engine's own: `note` says which.

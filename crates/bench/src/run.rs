@@ -194,21 +194,20 @@ impl Heat {
             track: &lane.track,
             seconds: lane.total as f64 * f64::from(lane.setting.dt),
         });
-        let line = |error: &cases::Error| {
+        let fell = run.as_ref().is_some_and(self.case.fell);
+        let line = |(place, error): (usize, &cases::Error)| {
             let value = run.as_ref().map(|run| (error.of)(run)).filter(|value| value.is_finite());
-            let failed = run.is_some() && value.is_none();
-            Record {
-                quantity: error.name.into(),
-                unit: error.unit.into(),
-                value,
-                outcome: if failed { Outcome::Failed } else { base.outcome },
-                note: if failed { "its error is not finite".into() } else { base.note.clone() },
-                ..base.clone()
-            }
+            let (value, outcome, note) = match (&run, value) {
+                (Some(_), None) => (None, Outcome::Failed, "its error is not finite"),
+                (Some(_), Some(_)) if fell && place > 0 => (None, Outcome::Fell, "what should stand has fallen"),
+                (_, value) => (value, base.outcome, base.note.as_str()),
+            };
+            let (quantity, unit) = (error.name.into(), error.unit.into());
+            Record { quantity, unit, value, outcome, note: note.into(), ..base.clone() }
         };
         let told =
             |note: &String| Record { note: note.clone(), ..conditions.record(Kind::Engine, "", lane.contestant.name) };
-        self.case.errors.iter().map(line).chain(lane.facts.differs.iter().map(told)).collect()
+        self.case.errors.iter().enumerate().map(line).chain(lane.facts.differs.iter().map(told)).collect()
     }
 }
 

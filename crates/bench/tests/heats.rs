@@ -159,6 +159,25 @@ fn every_end_is_told_for_what_it_is() {
     assert_eq!(of("slow").ms_median, Some(500.0), "what it took so far stands");
 }
 
+fn fallen(scene: &Scene, _: &Setting, _: &Means) -> Result<Box<dyn Engine>, Refusal> {
+    let mut made = MadeUp::new("fallen", scene);
+    let below = Pose { translation: Vec3::Y * 0.5, rotation: Quat::IDENTITY };
+    made.poses = Poses::collect(0, made.bodies.iter().map(|&b| (b, below)));
+    Ok(Box::new(made))
+}
+
+/// The top of a column of ten came down by 9 m, and nothing else is told of it.
+#[test]
+fn of_what_fell_only_the_headline_is_told() {
+    let heats = heats(&[column()], &[contestant("fallen", fallen)], &[4], &[], 1, &conditions());
+    let records = heats[0].run(&conditions(), &mut |_| {});
+    assert_eq!((records[0].outcome, records[0].value), (Outcome::Done, Some(9.0)));
+    assert!(records.len() > 2);
+    for r in &records[1..] {
+        assert_eq!((r.outcome, r.value), (Outcome::Fell, None), "{}", r.quantity);
+    }
+}
+
 /// Steps 151 to 300 of 300, which take 15.1 to 30 ms: a median of 22.55 and a p95 of 29.255.
 #[test]
 fn the_second_half_is_timed() {

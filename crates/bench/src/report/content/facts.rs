@@ -135,6 +135,7 @@ fn outcome(record: &Record) -> &'static str {
     match record.outcome {
         Outcome::Done => "no usable number",
         Outcome::Slow => "given up at the limit of time",
+        Outcome::Fell => "the structure fell",
         Outcome::Unmodelled => "no means for it",
         Outcome::Failed => "failed",
     }
