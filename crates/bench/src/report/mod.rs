@@ -26,7 +26,7 @@ use crate::record::Record;
 use std::path::{Path, PathBuf};
 
 /// Pixels of a PNG for each pixel of its SVG; the overview has its own size.
-const ZOOM: f32 = 1.5;
+const ZOOM: f32 = 1.0;
 
 /// Writes `NAME.md`, `NAME.html`, and the pictures of both into `NAME/` as SVG and PNG, `overview` among them; returns
 /// their paths. Pictures of an earlier report in `NAME/` that this one has not are removed. Both link to `NAME.csv`, the
