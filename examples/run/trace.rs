@@ -3,7 +3,8 @@
 //! dev-dependency would turn it on for tests and benches too, and it knows nothing of the device.)
 //!
 //! The device's clock has no known relation to the host's. Its stages are drawn from the end of the submission that they
-//! came with: they cannot have begun much earlier, and may have begun later.
+//! came with, or as much earlier as makes them end before the host had waited for their end, but never from before the
+//! submission began. So they are late or early by no more than the submission and the time that the device was idle.
 
 use serde_json::{Value, json};
 use std::collections::VecDeque;
@@ -27,6 +28,17 @@ struct Step {
     contacts: u32,
     host: Vec<StageRun>,
     device: Vec<StageRun>,
+}
+
+impl Step {
+    /// When the device's stages are taken to begin.
+    fn device_begin(&self) -> f64 {
+        let end = |run: &StageRun| run.begin + run.milliseconds;
+        let last = |stage: &str| self.host.iter().rfind(|run| run.stage == stage);
+        let (submit, took) = (last("submit"), self.device.last().map_or(0.0, end));
+        let heard = last("wait").map_or(self.milliseconds, end);
+        self.begin + submit.map_or(0.0, |submit| end(submit).min(heard - took).max(submit.begin))
+    }
 }
 
 /// The last steps of a run.
@@ -72,7 +84,7 @@ impl Trace {
             "adapter": self.adapter,
             "steps": self.steps.len(),
             "earlier steps left out": self.forgotten,
-            "device clock": "stages of the GPU are drawn from the end of their submission on",
+            "device clock": "stages of the GPU are drawn from the end of their submission on, or so that they end before the wait for them does",
         });
         // Writing to a string cannot fail.
         let _ = write!(
@@ -98,10 +110,9 @@ impl Trace {
             for run in &step.host {
                 push(span(run.stage, HOST, step.begin + run.begin, run.milliseconds, &args));
             }
-            let submitted = step.host.iter().rfind(|run| run.stage == "submit");
-            let submitted = step.begin + submitted.map_or(0.0, |run| run.begin + run.milliseconds);
+            let begin = step.device_begin();
             for run in &step.device {
-                push(span(run.stage, DEVICE, submitted + run.begin, run.milliseconds, &args));
+                push(span(run.stage, DEVICE, begin + run.begin, run.milliseconds, &args));
             }
             for (name, value) in [
                 ("pairs", json!(step.pairs)),
