@@ -105,6 +105,7 @@ fn every_stage_of_every_report() {
             // Each end may be rounded otherwise.
             assert!((told - expected).abs() <= runs as i64, "{told} {expected}");
             assert!(report.host_runs.iter().chain(&report.device_runs).all(|run| run.milliseconds >= 0.0));
+            assert!(expected > 0);
             grown += report.host_runs.iter().filter(|run| run.stage == "growth").count();
 
             let host = stages(&report.host_runs);

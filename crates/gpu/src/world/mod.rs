@@ -119,9 +119,10 @@ impl World {
             packed.states.iter().zip(&packed.props).map(|(s, p)| PoseRecord::of(s, p)).collect();
         gpu.queue.write_buffer(buffers.buffer("poses")?, 0, bytemuck::cast_slice(&poses));
         let built = Built { plan: packed.plan, choice: Choice::new(&params, &editor) };
-        let span = Span::enter("pipelines");
-        let stages = Stages::new(&gpu, &mut pipelines, &sizes, &built)?;
-        drop(span);
+        let stages = {
+            let _span = Span::enter("pipelines");
+            Stages::new(&gpu, &mut pipelines, &sizes, &built)?
+        };
         let timer = if params.profile { Timer::new(&gpu)? } else { None };
         let control_bytes = size_of::<Control>() as u64;
         Ok(Self {
