@@ -4,12 +4,9 @@
 //! `--quick` runs one iteration of everything, as a test; `--out DIR` writes `step.csv` and a picture, `step.svg`;
 //! `--profile` adds the CPU side's time by stage.
 
-#[path = "../tests/common/rapier.rs"]
-mod rapier;
-
-use rapier::RapierWorld;
 use std::time::Instant;
 use tumble::prelude::*;
+use tumble_bench::engines::RapierWorld;
 use tumble_core::{Penetration, measures, scenes};
 
 struct Settings {

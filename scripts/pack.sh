@@ -21,7 +21,7 @@ executables test --release --test '*' | while read -r path; do
     parity_* | primitives | world_broadphase | world_capacity | world_determinism | queries*) cp "$path" "$folder/tests/$name" ;;
     esac
 done
-executables bench | while read -r path; do
+executables bench --features box3d | while read -r path; do
     name=$(basename "$path" | sed 's/-[0-9a-f]*$//')
     cp "$path" "$folder/benches/$name"
 done
@@ -38,9 +38,12 @@ fi
 
 cat >"$folder/run.sh" <<'RUN'
 #!/usr/bin/env bash
-# Runs what is packed here: every test, then every bench; tables and pictures go to RESULTS (at first: results).
+# Runs what is packed here: every test, then every bench; tables, pictures and the report go to RESULTS (at first:
+# results). PYTHON=FILE names an interpreter with the wheels of nexus and MuJoCo, for speed_vs_error.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
+TUMBLE_COMMIT=$(cat commit)
+export TUMBLE_COMMIT
 results=${1:-results}
 shift || true
 mkdir -p "$results"
@@ -51,9 +54,17 @@ for test in tests/*; do
 done
 for bench in benches/*; do
     echo "== $bench"
-    "$bench" --out "$results" "$@" 2>&1 | tee "$results/$(basename "$bench").txt" || failed=1
+    peers=()
+    if [ "$bench" = benches/speed_vs_error ] && [ -n "${PYTHON:-}" ]; then
+        peers=(--python "$PYTHON")
+    fi
+    "$bench" --out "$results" "${peers[@]}" "$@" 2>&1 | tee "$results/$(basename "$bench").txt" || failed=1
 done
 exit $failed
 RUN
 chmod +x "$folder/run.sh"
+# What the tables tell they were measured at: there is no git where they are made.
+commit=$(git rev-parse --short=10 HEAD)
+[ -z "$(git status --porcelain --untracked-files=no)" ] || commit=$commit+
+echo "$commit" >"$folder/commit"
 echo "packed: $(ls "$folder/tests" "$folder/benches" | tr '\n' ' ')"

@@ -8,12 +8,10 @@
 //! `cargo test --release --test versus_rapier -- --nocapture --test-threads 1`.
 
 mod common;
-#[path = "common/rapier.rs"]
-mod rapier;
 
-use rapier::RapierWorld;
 use rayon::prelude::*;
 use tumble::prelude::*;
+use tumble_bench::engines::RapierWorld;
 use tumble_core::{measures, scenes};
 
 /// Seeds of the chaotic scenes.

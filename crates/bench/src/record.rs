@@ -15,6 +15,9 @@ pub enum Kind {
     Stage,
     /// What the device can do, such as its copy bandwidth.
     Device,
+    /// What an engine says of itself: `note` tells one way in which its setting differs from the others', or why it did
+    /// not run.
+    Engine,
 }
 
 /// How a measurement ended.
@@ -52,7 +55,7 @@ pub struct Record {
     pub substeps: u32,
     /// Seed of the scene; 0 where it has none.
     pub seed: u64,
-    /// The broad phase that ran, where the engine lets one choose.
+    /// The broad phase that was asked for, where the engine lets one choose.
     pub broadphase: String,
     /// The solver that ran, where the engine lets one choose.
     pub solver: String,

@@ -29,7 +29,9 @@ fn every_standard_scene_has_the_bodies_asked_for() {
         for bodies in [0, 1, 2, 255, 256, 257, standard.default_bodies] {
             let scene = (standard.build)(bodies);
             let found = dynamic(&scene);
-            if standard.name == "pyramid" {
+            if standard.name == "many_pyramids" && bodies >= 55 {
+                assert_eq!(found, bodies / 55 * 55);
+            } else if standard.name.ends_with("pyramid") || standard.name == "many_pyramids" {
                 let base = (0..).take_while(|b| b * (b + 1) / 2 <= bodies).last().unwrap();
                 assert_eq!(found, base * (base + 1) / 2);
             } else {
@@ -51,12 +53,34 @@ fn the_pyramid_of_base_100_has_5050_boxes() {
 /// Neither a gap nor an overlap, to the last bit.
 #[test]
 fn stacks_touch_exactly() {
-    for (scene, name) in [(scenes::column(40), "column"), (scenes::pyramid(20), "pyramid"), (scenes::hub(500), "hub")] {
+    for (scene, name) in [
+        (scenes::column(40), "column"),
+        (scenes::pyramid(20), "pyramid"),
+        (scenes::topped_pyramid(10, 300.0), "topped pyramid"),
+        (scenes::wide_pyramid(15), "wide pyramid"),
+        (scenes::many_pyramids(9, 10), "many pyramids"),
+        (scenes::large_on_small(), "large on small"),
+        (scenes::hub(500), "hub"),
+    ] {
         let poses = initial_poses(&scene);
         assert_eq!(penetration(&scene, &poses).max_m, 0.0, "{name}");
         let lowest = scene.bodies().map(|b| poses[b].translation.y).filter(|&y| y > 0.0).fold(f32::MAX, f32::min);
         assert_eq!(lowest, 0.5, "{name}");
     }
+}
+
+#[test]
+fn structures_have_the_bodies_and_masses_they_say() {
+    assert_eq!(dynamic(&scenes::many_pyramids(196, 10)), 10_780);
+    assert_eq!(dynamic(&scenes::wide_pyramid(15)), 1240);
+    let masses = |scene: &Scene| {
+        let all: Vec<_> = scene.bodies().map(|b| scene.mass_properties(b).unwrap().mass).filter(|&m| m > 0.0).collect();
+        all.iter().fold(0.0, |most: f32, &m| most.max(m)) / all.iter().fold(f32::MAX, |least, &m| least.min(m))
+    };
+    assert_eq!(dynamic(&scenes::topped_pyramid(10, 300.0)), 55);
+    // Densities and volumes are rounded to f32.
+    assert!((masses(&scenes::topped_pyramid(10, 300.0)) / 300.0 - 1.0).abs() < 2e-7);
+    assert!((masses(&scenes::large_on_small()) / 8000.0 - 1.0).abs() < 2e-7);
 }
 
 #[test]

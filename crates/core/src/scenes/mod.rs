@@ -13,7 +13,9 @@ mod stacks;
 pub use crowds::{Crowd, crowd};
 pub use heaps::{balls, balls_seeded, mixed, mixed_seeded, pile, pile_seeded};
 pub use motion::{bouncing_ball, bullet, closed_system, cradle, free_box, free_fall, ramp, sliding_box, slip_to_roll};
-pub use stacks::{column, hub, mass_ratio, overlap_cube, pyramid};
+pub use stacks::{
+    column, hub, large_on_small, many_pyramids, mass_ratio, overlap_cube, pyramid, topped_pyramid, wide_pyramid,
+};
 
 use crate::builder::{ColliderBuilder, RigidBodyBuilder};
 use crate::handle::BodyHandle;
@@ -46,6 +48,12 @@ pub const ALL: &[StandardScene] = &[
         about: "a standing wall of boxes, each layer half a box over the one below",
         default_bodies: 5050,
         build: |bodies| pyramid(pyramid_base(bodies)),
+    },
+    StandardScene {
+        name: "many_pyramids",
+        about: "rows of standing walls of 55 boxes each",
+        default_bodies: 10_780,
+        build: |bodies| if bodies < 55 { pyramid(pyramid_base(bodies)) } else { many_pyramids(bodies / 55, 10) },
     },
     StandardScene { name: "balls", about: "balls dropped into a pit", default_bodies: 4000, build: balls },
     StandardScene {

@@ -20,13 +20,71 @@ pub fn column(bodies: usize) -> Scene {
 pub fn pyramid(base: usize) -> Scene {
     let mut scene = Scene::new();
     add_floor(&mut scene, FRICTION, 0.0);
+    add_wall(&mut scene, base, Vec3::ZERO);
+    scene
+}
+
+/// A wall as of [`pyramid`], the middle of its foot at `at`.
+fn add_wall(scene: &mut Scene, base: usize, at: Vec3) {
     for layer in 0..base {
         let count = base - layer;
         for i in 0..count {
             let x = (i as f32 - (count as f32 - 1.0) * 0.5) * 1.05;
-            scene.insert(dynamic(Vec3::new(x, layer as f32 + 0.5, 0.0)), cuboid(Vec3::splat(0.5)));
+            scene.insert(dynamic(at + Vec3::new(x, layer as f32 + 0.5, 0.0)), cuboid(Vec3::splat(0.5)));
         }
     }
+}
+
+/// `count` walls as of [`pyramid`], each with `base` boxes in its lowest layer, in rows and columns as near to a square
+/// as can be: 14 x 14 walls of base 10 are 10,780 boxes. Neighbours are 2 m and more apart.
+pub fn many_pyramids(count: usize, base: usize) -> Scene {
+    let mut scene = Scene::new();
+    add_floor(&mut scene, FRICTION, 0.0);
+    let edge = count.isqrt() + usize::from(count.isqrt().pow(2) < count);
+    let middle = (edge as f32 - 1.0) * 0.5;
+    for i in 0..count {
+        let (column, row) = ((i % edge) as f32 - middle, (i / edge) as f32 - middle);
+        add_wall(&mut scene, base, Vec3::new(column * (base as f32 * 1.05 + 2.0), 0.0, row * 3.0));
+    }
+    scene
+}
+
+/// A [`pyramid`] whose topmost box is `ratio` times as heavy as the others.
+pub fn topped_pyramid(base: usize, ratio: f32) -> Scene {
+    let mut scene = pyramid(base);
+    if let Some(top) = scene.bodies().last() {
+        let place = scene.body(top).map(|body| body.translation).unwrap_or_default();
+        // The last body is of this scene and living, or there would be none.
+        let _ = scene.remove(top);
+        scene.insert(dynamic(place), cuboid(Vec3::splat(0.5)).density(DENSITY * ratio));
+    }
+    scene
+}
+
+/// Square layers of 1 m boxes, `layers` x `layers` of them in the lowest and one row fewer each way in each above,
+/// half a box over the one below: 1,240 boxes for 15 layers. Neighbours are 0.05 m apart.
+pub fn wide_pyramid(layers: usize) -> Scene {
+    let mut scene = Scene::new();
+    add_floor(&mut scene, FRICTION, 0.0);
+    for layer in 0..layers {
+        let count = layers - layer;
+        let place = |i: usize| (i as f32 - (count as f32 - 1.0) * 0.5) * 1.05;
+        for i in 0..count * count {
+            let at = Vec3::new(place(i % count), layer as f32 + 0.5, place(i / count));
+            scene.insert(dynamic(at), cuboid(Vec3::splat(0.5)));
+        }
+    }
+    scene
+}
+
+/// A cube of 20 m on two of 1 m, 8 m apart: it weighs 8,000 times as much as either.
+pub fn large_on_small() -> Scene {
+    let mut scene = Scene::new();
+    add_floor(&mut scene, FRICTION, 0.0);
+    for x in [-4.5, 4.5] {
+        scene.insert(dynamic(Vec3::new(x, 0.5, 0.0)), cuboid(Vec3::splat(0.5)));
+    }
+    scene.insert(dynamic(Vec3::new(0.0, 11.0, 0.0)), cuboid(Vec3::splat(10.0)));
     scene
 }
 

@@ -83,7 +83,9 @@ pub fn sort(boxes: &Boxes, axis: usize) -> Sorted {
     let keys = order.iter().map(|both| (both >> 32) as u32).collect();
     let boxes: Vec<Aabb> = order.par_iter().with_min_len(2048).map(entry).collect();
     let mut across = [const { Vec::new() }; 4];
-    across.par_iter_mut().enumerate().for_each(|(side, list)| {
+    // Short lists are made sooner than shared.
+    let at_once = if boxes.len() < 2048 { 4 } else { 1 };
+    across.par_iter_mut().enumerate().with_min_len(at_once).for_each(|(side, list)| {
         let axis = (axis + 1 + side / 2) % 3;
         *list = boxes.iter().map(|aabb| if side % 2 == 0 { aabb.min[axis] } else { aabb.max[axis] }).collect();
     });

@@ -1,10 +1,11 @@
-//! The same scene in rapier, for oracles and benches.
+//! The same scene in rapier, for benches and as an oracle of tests.
 
+use super::{Engine, Facts, Means, Refusal, Setting, timed};
 use rapier3d::prelude as r;
-use tumble_core::{BodyHandle, CombineRule, Params, Pose, Poses, RigidBodyType, Scene, Shape, Velocity};
+use tumble_core::{BodyHandle, CombineRule, Params, Pose, Poses, RigidBodyType, Scene, Shape, Velocities, Velocity};
 
 /// A scene in rapier, with sleep off.
-pub(crate) struct RapierWorld {
+pub struct RapierWorld {
     world: r::PhysicsWorld,
     bodies: Vec<(BodyHandle, r::RigidBodyHandle)>,
 }
@@ -20,7 +21,10 @@ fn rule(rule: CombineRule) -> r::CoefficientCombineRule {
 
 impl RapierWorld {
     /// Same dt, sub-steps and gravity; rapier's own defaults otherwise.
-    pub(crate) fn new(scene: &Scene, params: &Params, threads: usize) -> Self {
+    ///
+    /// # Panics
+    /// When its threads do not start.
+    pub fn new(scene: &Scene, params: &Params, threads: usize) -> Self {
         let mut world = r::PhysicsWorld { gravity: scene.gravity, ..r::PhysicsWorld::default() };
         world.integration_parameters.dt = params.dt;
         world.integration_parameters.num_solver_iterations = params.substeps as usize;
@@ -67,12 +71,13 @@ impl RapierWorld {
         Self { world, bodies }
     }
 
-    pub(crate) fn step(&mut self) {
+    /// One step.
+    pub fn step(&mut self) {
         self.world.step();
     }
 
     /// All poses, in tumble's form.
-    pub(crate) fn poses(&self) -> Poses {
+    pub fn poses(&self) -> Poses {
         Poses::collect(
             0,
             self.bodies.iter().map(|&(h, b)| {
@@ -83,14 +88,41 @@ impl RapierWorld {
     }
 
     /// All velocities, in tumble's form.
-    #[allow(dead_code, reason = "benches read poses alone")]
-    pub(crate) fn velocities(&self) -> tumble_core::Velocities {
-        tumble_core::Velocities::collect(
+    pub fn velocities(&self) -> Velocities {
+        Velocities::collect(
             0,
             self.bodies.iter().map(|&(h, b)| {
                 let b = &self.world.bodies[b];
                 (h, Velocity { linear: b.linvel(), angular: b.angvel() })
             }),
         )
+    }
+}
+
+pub(super) fn make(scene: &Scene, setting: &Setting, _: &Means) -> Result<Box<dyn Engine>, Refusal> {
+    let params = Params { dt: setting.dt, substeps: setting.substeps, ..Params::default() };
+    Ok(Box::new(Rapier { world: RapierWorld::new(scene, &params, setting.threads), threads: setting.threads }))
+}
+
+struct Rapier {
+    world: RapierWorld,
+    threads: usize,
+}
+
+impl Engine for Rapier {
+    fn step(&mut self, count: u32) -> Result<Vec<f64>, String> {
+        timed(count, || {
+            self.world.step();
+            Ok(())
+        })
+    }
+
+    fn state(&mut self) -> Result<(Poses, Velocities), String> {
+        Ok((self.world.poses(), self.world.velocities()))
+    }
+
+    fn facts(&mut self) -> Facts {
+        let adapter = format!("{} threads", self.threads);
+        Facts { version: rapier3d::VERSION.into(), adapter, ..Facts::default() }
     }
 }
