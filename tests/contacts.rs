@@ -133,6 +133,30 @@ fn friction_holds_what_it_must() {
     }
 }
 
+/// With one sub-step the impulses of all steps are the change of momentum, blows included: a ball that lands, one that
+/// bounces, one that slides and rolls. Oracle: mechanics; the sums are off by 2e-7.
+#[test]
+fn pushes_add_up() {
+    let cases = [scenes::bouncing_ball(0.0, 1.0), scenes::bouncing_ball(0.7, 1.0), scenes::slip_to_roll(0.6, 7.0)];
+    for side in SIDES {
+        for (scene, body) in &cases {
+            let mut world = side.world(scene, &Params { substeps: 1, ..Params::default() });
+            let before = world.velocities().unwrap()[*body].linear;
+            let mut sum = Vec3::ZERO;
+            for _ in 0..100 {
+                steps(&mut world, 1);
+                let contacts = contacts(&mut world);
+                sum += forces_on(&contacts, *body).map(|(_, force)| force * contacts.dt).sum::<Vec3>();
+            }
+            let change = world.velocities().unwrap()[*body].linear - before;
+            let weight = mass(scene, *body) * G * 100.0 / 60.0;
+            let off = (sum - mass(scene, *body) * change - weight * Vec3::Y).length() / weight;
+            eprintln!("{side:?}: off by {off:e}");
+            assert!(off <= 1e-5, "{side:?}: {sum}, {change}");
+        }
+    }
+}
+
 /// Under a ball that rolls fast the contact is where the ball is at the end of the step, and as deep. Oracle: geometry.
 #[test]
 fn a_rolling_ball_touches_below_its_middle() {

@@ -51,8 +51,10 @@ pub struct ContactPoint {
     /// What the second body was pushed along the normal, and the first against it; N s, never negative.
     ///
     /// It is the impulse of the last sub-step times the number of sub-steps. Divided by [`Contacts::dt`] it is the force
-    /// at the end of the step, in N: under a ball at rest m g. In a step in which bodies meet, it is not the sum of what
-    /// was pushed: a blow in an earlier sub-step is not in it.
+    /// at the end of the step, in N: under a ball at rest m g. With one sub-step a step it is all that was pushed. With
+    /// more it is that only where the push is steady: a blow counts as often as there are sub-steps if it falls in the
+    /// last, and not at all before; and a ball that rolls fast is carried by the first sub-steps of a step, so that the
+    /// last reads less than its weight, down to nothing (at 4 sub-steps of 1/60 s and 5 m/s on a radius of 0.5 m).
     pub normal_impulse: f32,
     /// What friction pushed the second body, and the first the other way; world axes, N s, taken as the above.
     pub friction_impulse: Vec3,
