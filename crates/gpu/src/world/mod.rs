@@ -1,8 +1,8 @@
 //! A world on the GPU: submission, the ring of statuses and the edit log. What grows is in `growth`.
 
-mod contacts;
 mod growth;
 mod queries;
+mod results;
 
 use crate::broadphase::Choice;
 use crate::query::Query;
@@ -15,10 +15,10 @@ use glam::Vec3;
 use growth::within;
 use std::collections::VecDeque;
 use tumble_core::edit::EditBatch;
-use tumble_core::layout::{BodyState, Control, LAST_BATCH, Pair, PoseRecord, StepParams};
+use tumble_core::layout::{Control, LAST_BATCH, Pair, PoseRecord, StepParams};
 use tumble_core::limits::{self, Room};
 use tumble_core::stopwatch::{Span, Stopwatch};
-use tumble_core::{Editor, Error, Params, Poses, Result, Scene, StageRun, StageTime, StepReport, Velocities};
+use tumble_core::{Editor, Params, Poses, Result, Scene, StageRun, StageTime, StepReport};
 
 /// Steps in flight before `step` waits.
 const IN_FLIGHT: usize = 3;
@@ -82,8 +82,9 @@ impl World {
     /// Loads a scene onto the best adapter there is, a software one too.
     ///
     /// # Errors
-    /// What is wrong with the scene or the parameters; [`Error::NoAdapter`]; [`Error::Limits`] and
-    /// [`Error::OutOfMemory`] when the adapter is too small for the scene.
+    /// What is wrong with the scene or the parameters; [`Error::NoAdapter`](tumble_core::Error::NoAdapter);
+    /// [`Error::Limits`](tumble_core::Error::Limits) and [`Error::OutOfMemory`](tumble_core::Error::OutOfMemory) when the
+    /// adapter is too small for the scene.
     pub fn new(scene: Scene, params: Params) -> Result<Self> {
         Self::with_gpu(Gpu::any()?, scene, params)
     }
@@ -175,7 +176,7 @@ impl World {
     /// Parameters from the next step on.
     ///
     /// # Errors
-    /// [`Error::Invalid`] names the field.
+    /// [`Error::Invalid`](tumble_core::Error::Invalid) names the field.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
         params.validate()?;
         if params.profile && self.timer.is_none() {
@@ -220,9 +221,10 @@ impl World {
     /// Submits one step. Waits only when three are in flight.
     ///
     /// # Errors
-    /// [`Error::Capacity`] when this step or an earlier one needs more room than it may have: nothing is submitted, the
-    /// edits wait for the next call, and the last good state stays readable. [`Error::DeviceLost`],
-    /// [`Error::OutOfMemory`] and [`Error::Gpu`] from the device.
+    /// [`Error::Capacity`](tumble_core::Error::Capacity) when this step or an earlier one needs more room than it may
+    /// have: nothing is submitted, the edits wait for the next call, and the last good state stays readable.
+    /// [`Error::DeviceLost`](tumble_core::Error::DeviceLost), [`Error::OutOfMemory`](tumble_core::Error::OutOfMemory) and
+    /// [`Error::Gpu`](tumble_core::Error::Gpu) from the device.
     pub fn step(&mut self) -> Result<()> {
         let _span = Span::enter("step");
         self.watch.start(self.params.profile);
@@ -254,66 +256,6 @@ impl World {
         self.run_waiting()?;
         self.take_statuses(0)?;
         Ok(self.report())
-    }
-
-    /// Waits for all submitted steps; the pose of every body, in one download.
-    ///
-    /// # Errors
-    /// As for [`World::step`]; once that was told, the last good poses.
-    pub fn poses(&mut self) -> Result<Poses> {
-        self.take_statuses(0)?;
-        let run = self.watch.begin("readback");
-        let bytes = read_now(&self.gpu, self.buffers.buffer("poses")?, 0, pose_bytes(&self.sizes))?;
-        self.watch.end(run);
-        Ok(self.poses_of(self.last.step, &bytes))
-    }
-
-    /// The newest poses that have arrived, without waiting; `None` before the first have. Each call asks for new ones.
-    /// Those that arrived before the device was lost stay.
-    ///
-    /// # Errors
-    /// As for [`World::step`].
-    pub fn try_poses(&mut self) -> Result<Option<Poses>> {
-        match self.fetch_poses() {
-            Err(Error::DeviceLost { .. }) if self.newest_poses.is_some() => {}
-            done => done?,
-        }
-        Ok(self.newest_poses.clone())
-    }
-
-    /// Takes what poses have arrived and asks for new ones.
-    fn fetch_poses(&mut self) -> Result<()> {
-        if let Some(bytes) = self.pose_copies.try_take(&self.gpu)? {
-            let control = self.step_copies.wait_take(&self.gpu)?.unwrap_or_default();
-            self.newest_poses = Some(self.poses_of(read_control(&control).step, &bytes));
-        }
-        if self.submitted > 0 && !self.pose_copies.is_full() {
-            let (poses, control) = (self.buffers.buffer("poses")?, self.buffers.buffer("control")?);
-            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-            self.pose_copies.copy(&mut encoder, poses, 0);
-            self.step_copies.copy(&mut encoder, control, 0);
-            let index = self.gpu.scoped("a copy of the poses", || self.gpu.queue.submit([encoder.finish()]))?;
-            self.pose_copies.submitted(&index);
-            self.step_copies.submitted(&index);
-        }
-        Ok(())
-    }
-
-    /// Waits for all submitted steps; the velocity of every body, in one download.
-    ///
-    /// # Errors
-    /// As for [`World::poses`].
-    pub fn velocities(&mut self) -> Result<Velocities> {
-        self.take_statuses(0)?;
-        let bytes = u64::from(self.sizes.bodies) * size_of::<BodyState>() as u64;
-        let run = self.watch.begin("readback");
-        let bytes = read_now(&self.gpu, self.buffers.buffer("states")?, 0, bytes)?;
-        self.watch.end(run);
-        Ok(Velocities::from_states(self.last.step.into(), &bytemuck::pod_collect_to_vec::<u8, BodyState>(&bytes)))
-    }
-
-    fn poses_of(&self, step: u32, bytes: &[u8]) -> Poses {
-        Poses::from_records(step.into(), &bytemuck::pod_collect_to_vec::<u8, PoseRecord>(bytes))
     }
 
     fn report(&self) -> StepReport {
