@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Runs every test of every crate: unit, integration and documentation tests, and builds the examples.
-# Installs the software Vulkan driver first where the machine has no Vulkan driver (Debian and its kin).
+# Installs first what is missing of what they need (Debian and its kin): a software Vulkan driver where there is no Vulkan
+# driver, a virtual X server for the test of the window, a browser without a screen for the test of the report.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -20,28 +21,35 @@ has_loader() {
     PATH="$PATH:/sbin:/usr/sbin" ldconfig -p 2>/dev/null | grep -F libvulkan.so.1 >/dev/null
 }
 
-install_vulkan() {
+# What the tests need and the machine lacks, by Debian's names.
+missing=()
+# macOS has Metal, and no X server.
+if [ "$(uname -s)" = Linux ]; then
+    has_vulkan && has_loader || missing+=(mesa-vulkan-drivers libvulkan1)
+    command -v Xvfb >/dev/null || missing+=(xvfb)
+fi
+browser=
+for name in chromium-headless-shell chromium google-chrome chrome; do
+    browser=$browser$(command -v "$name" || true)
+done
+[ -n "$browser" ] || missing+=(chromium-headless-shell)
+
+if [ ${#missing[@]} -gt 0 ]; then
+    as_root=()
     if ! command -v apt-get >/dev/null; then
-        echo "No Vulkan driver was found. Install one; Mesa's lavapipe runs on any CPU." >&2
+        echo "Missing, by Debian's names: ${missing[*]}. Install them; Mesa's lavapipe is a Vulkan driver for any CPU." >&2
         exit 1
     fi
-    local as_root=()
     if [ "$(id -u)" -ne 0 ]; then
         if ! command -v sudo >/dev/null; then
-            echo "No Vulkan driver was found. As root: apt-get install mesa-vulkan-drivers libvulkan1" >&2
+            echo "Missing. As root: apt-get install ${missing[*]}" >&2
             exit 1
         fi
         as_root=(sudo)
     fi
-    echo "Installing the software Vulkan driver"
+    echo "Installing ${missing[*]}"
     "${as_root[@]}" apt-get update
-    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-        apt-get install --yes --no-install-recommends mesa-vulkan-drivers libvulkan1
-}
-
-# macOS has Metal.
-if [ "$(uname -s)" = Linux ] && ! { has_vulkan && has_loader; }; then
-    install_vulkan
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends "${missing[@]}"
 fi
 if ! command -v cargo >/dev/null; then
     echo "cargo was not found. Install Rust: https://rustup.rs" >&2

@@ -1,11 +1,13 @@
 //! The program `examples/run`: what it prints and writes, how it refuses, and what README.md says of it. Oracles: its
 //! documented fields, and the library run on the same scene.
 
+mod common;
 #[path = "common/program.rs"]
 mod program;
 
 use program::program;
 use serde_json::Value;
+use std::path::Path;
 use std::process::{Command, Output};
 use tumble::core::{measures, scenes};
 use tumble::{Backend, Broadphase, Params, World};
@@ -160,7 +162,7 @@ fn runs_on_an_adapter() {
 
 #[test]
 fn bad_arguments_are_refused_in_one_line() {
-    let cases: [(&[&str], &[&str]); 21] = [
+    let cases: [(&[&str], &[&str]); 28] = [
         (&[], &["no scene", "pile", "pyramid", "hub"]),
         (&["pyramd"], &["'pyramd'", "pile", "balls", "mixed", "column", "hub", "similar", "'pyramid'"]),
         (&["pile", "--bodies", "0"], &["'0'", "--bodies", "1 to 5000000"]),
@@ -182,6 +184,13 @@ fn bad_arguments_are_refused_in_one_line() {
         (&["pile", "--broadphase", "sweep"], &["'sweep'", "--broadphase", "auto", "grid"]),
         (&["pile", "hub"], &["'hub'"]),
         (&["pile", "--fast"], &["'--fast'"]),
+        (&["pile", "--size", "0x720"], &["'0x720'", "--size", "1280x720", "1 to 8192"]),
+        (&["pile", "--size", "1280x8193"], &["'1280x8193'", "--size", "1 to 8192"]),
+        (&["pile", "--size", "99999999999x1"], &["'99999999999x1'", "--size"]),
+        (&["pile", "--size", "-1x5"], &["'-1x5'", "--size"]),
+        (&["pile", "--size", "1280"], &["'1280'", "--size", "1280x720"]),
+        (&["pile", "--size", "1280x720x3"], &["'1280x720x3'", "--size"]),
+        (&["pile", "--png"], &["--png"]),
     ];
     for (arguments, told) in cases {
         let output = run(arguments);
@@ -206,12 +215,108 @@ fn limits_agree_with_the_library() {
 #[test]
 fn a_path_that_cannot_be_written_costs_no_run() {
     let folder = tempfile::tempdir().unwrap();
-    let missing = folder.path().join("none").join("out.json");
-    for path in [missing.as_path(), folder.path()] {
-        let output = run(&["column", "--backend", "cpu", "--steps", "10000000", "--json", path.to_str().unwrap()]);
+    let missing = folder.path().join("none").join("out");
+    let file = folder.path().join("file");
+    std::fs::write(&file, "kept").unwrap();
+    let below_file = file.join("frames");
+    for (option, path) in [
+        ("--json", missing.as_path()),
+        ("--json", folder.path()),
+        ("--png", missing.as_path()),
+        ("--png", folder.path()),
+        ("--frames", file.as_path()),
+        ("--frames", below_file.as_path()),
+    ] {
+        let output = run(&["column", "--backend", "cpu", "--steps", "10000000", option, path.to_str().unwrap()]);
         assert_eq!(output.status.code(), Some(1));
         let line = error_line(&output);
-        assert!(line.contains("cannot write") && line.contains(path.to_str().unwrap()), "{line}");
+        assert!(line.contains("cannot write") && line.contains(path.to_str().unwrap()), "{option}: {line}");
+    }
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "kept");
+    let output = run(&["column", "--backend", "cpu", "--frames", file.to_str().unwrap()]);
+    assert!(error_line(&output).contains("it is a file"));
+}
+
+/// Width, height, and red, green and blue of each pixel.
+fn read_png(path: &Path) -> (u32, u32, Vec<u8>) {
+    let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut pixels).unwrap();
+    assert_eq!((info.color_type, info.bit_depth), (png::ColorType::Rgb, png::BitDepth::Eight));
+    (info.width, info.height, pixels)
+}
+
+/// Oracle: the pictures that the library makes of the same states.
+#[test]
+fn pictures_show_the_states_of_the_run() {
+    use tumble_draw::{Bounds, Camera, Offscreen, PoseUpload, Renderer, Style};
+    let folder = tempfile::tempdir().unwrap();
+    let (png, frames) = (folder.path().join("last.png"), folder.path().join("new").join("frames"));
+    std::fs::write(&png, "x".repeat(1 << 20)).unwrap();
+    let (png_path, frames_path) = (png.to_str().unwrap(), frames.to_str().unwrap());
+    // 0, 0.04, 0.08 (beyond 2/30), 0.12, 0.16, 0.2 s: 1/30 s has passed in each step.
+    let run_with = |dt: &str, steps: &str, backend: &str| {
+        let _ = std::fs::remove_dir_all(&frames);
+        let output = run(&[
+            "pile",
+            "--bodies",
+            "30",
+            "--steps",
+            steps,
+            "--dt",
+            dt,
+            "--backend",
+            backend,
+            "--size",
+            "101x60",
+            "--png",
+            png_path,
+            "--frames",
+            frames_path,
+        ]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let mut names: Vec<_> = std::fs::read_dir(&frames)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort_unstable();
+        names
+    };
+    let names = |count: u32| (0..count).map(|i| format!("frame_{i:04}.png")).collect::<Vec<_>>();
+    assert_eq!(run_with("0.04", "5", "cpu"), names(6));
+    // Every second step.
+    assert_eq!(run_with("0.0166666", "9", "gpu"), names(5));
+    // 0, 0.035 to 0.07 to 0.1 to 0.135: the first state at or after each thirtieth.
+    assert_eq!(run_with("0.005", "28", "cpu"), names(5));
+
+    let gpu = common::gpu();
+    let mut world = World::new(scenes::pile(30), Params { dt: 0.005, ..Params::default() }, Backend::Cpu).unwrap();
+    let mut upload = PoseUpload::new(&gpu.device, &gpu.queue);
+    let mut renderer = Renderer::new(&gpu.device, Offscreen::FORMAT, world.scene()).unwrap();
+    let offscreen = Offscreen::new(&gpu.device, &gpu.queue, 101, 60).unwrap();
+    let poses = world.poses().unwrap();
+    let first = Bounds::of(world.scene(), &poses);
+    let mut done = 0;
+    for (steps, file) in [
+        (0, frames.join("frame_0000.png")),
+        (7, frames.join("frame_0001.png")),
+        (14, frames.join("frame_0002.png")),
+        (20, frames.join("frame_0003.png")),
+        (27, frames.join("frame_0004.png")),
+        (28, png.clone()),
+    ] {
+        while done < steps {
+            world.step().unwrap();
+            done += 1;
+        }
+        let poses = world.poses().unwrap();
+        let bounds = if file == png { Bounds::of(world.scene(), &poses) } else { first };
+        let camera = Camera::framing(&bounds, 0.5, 0.36, 0.6, 101.0 / 60.0);
+        let buffer = upload.write(world.scene(), &poses).unwrap();
+        let expected = offscreen.picture(&mut renderer, &camera, buffer, &Style::default()).unwrap();
+        let expected: Vec<u8> = expected.chunks(4).flat_map(|pixel| pixel[..3].to_vec()).collect();
+        assert!(read_png(&file) == (101, 60, expected), "{}", file.display());
     }
 }
 
@@ -227,6 +332,20 @@ fn a_full_disk_is_told_and_the_table_still_comes() {
     assert!(text(&output.stdout).contains("state hash"));
 
     let full = || OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = Command::new(program()).args(run).args(["--png", "/dev/full", "--size", "64x36"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(error_line(&output).contains("cannot write /dev/full"));
+    assert!(text(&output.stdout).contains("state hash"));
+    // The first picture can be written, the second cannot.
+    let folder = tempfile::tempdir().unwrap();
+    std::os::unix::fs::symlink("/dev/full", folder.path().join("frame_0001.png")).unwrap();
+    let frames = ["--frames", folder.path().to_str().unwrap(), "--dt", "0.04", "--size", "64x36"];
+    let output = Command::new(program()).args(run).args(frames).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let line = error_line(&output);
+    assert!(line.contains("frame_0001.png") && line.contains("No space left"), "{line}");
+    assert!(text(&output.stdout).contains("state hash"));
+
     for arguments in [run.as_slice(), &["--list"]] {
         let output = Command::new(program()).args(arguments).stdout(full()).output().unwrap();
         assert_eq!(output.status.code(), Some(1));
@@ -240,18 +359,28 @@ fn a_full_disk_is_told_and_the_table_still_comes() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_machine_without_an_adapter() {
-    let run = |backend: &str| {
+    let run = |backend: &str, more: &[&str]| {
         let mut command = Command::new(program());
         for variable in ["VK_ICD_FILENAMES", "VK_DRIVER_FILES"] {
             command.env(variable, "/nonexistent");
         }
-        command.args(["column", "--steps", "2", "--backend", backend]).output().unwrap()
+        command.args(["column", "--steps", "2", "--backend", backend]).args(more).output().unwrap()
     };
-    let output = run("gpu");
+    // Nothing draws there.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out").to_str().unwrap().to_owned();
+    for option in ["--png", "--frames"] {
+        let output = run("cpu", &[option, &path]);
+        assert_eq!(output.status.code(), Some(1));
+        let line = error_line(&output);
+        assert!(line.contains("adapter") && line.contains("mesa-vulkan-drivers") && line.contains(option), "{line}");
+        let _ = std::fs::remove_file(&path);
+    }
+    let output = run("gpu", &[]);
     assert_eq!(output.status.code(), Some(1));
     let line = error_line(&output);
     assert!(line.contains("no GPU adapter was found") && line.contains("mesa-vulkan-drivers"), "{line}");
-    let output = run("auto");
+    let output = run("auto", &[]);
     assert!(output.status.success());
     assert!(text(&output.stderr).contains("running on the CPU"), "{}", text(&output.stderr));
     assert!(text(&output.stdout).contains("cpu ("));

@@ -12,6 +12,9 @@ const MOST_STEPS: u32 = 10_000_000;
 /// of the scene alone.
 const BYTES_A_BODY: u64 = 6000;
 const BYTES_A_BODY_OF_SCENE: u64 = 1000;
+/// What drawing holds for each pixel at most: four samples of colour and depth, and copies on the way to a file.
+const BYTES_A_PIXEL: u64 = 60;
+const MOST_PIXELS: u32 = 8192;
 
 /// Why the program ends early.
 pub(crate) enum Failure {
@@ -77,6 +80,17 @@ pub(crate) struct Args {
     /// pass as `--profile` does
     #[arg(long, value_name = "FILE")]
     pub(crate) trace: Option<PathBuf>,
+    /// Write a picture of the last state to this file, as PNG
+    #[arg(long, value_name = "FILE")]
+    pub(crate) png: Option<PathBuf>,
+    /// Write pictures to this folder, as PNG: `frame_0000.png` shows the state before the first step, the next ones the
+    /// first state at or after each further 1/30 s of simulated time (every state where a step is longer). The camera
+    /// stays where it sees the first state. Files of those names are replaced
+    #[arg(long, value_name = "DIR")]
+    pub(crate) frames: Option<PathBuf>,
+    /// Width and height of pictures, pixels, 1 to 8192 each
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size, allow_hyphen_values = true)]
+    size: (u32, u32),
     /// Name the scenes and end
     #[arg(long)]
     pub(crate) list: bool,
@@ -126,6 +140,24 @@ impl Args {
         }
     }
 
+    /// Width and height of pictures, where any are wanted.
+    pub(crate) fn picture_size(&self) -> Result<Option<(u32, u32)>, Failure> {
+        if self.png.is_none() && self.frames.is_none() {
+            return Ok(None);
+        }
+        let (width, height) = self.size;
+        let needed = u64::from(width) * u64::from(height) * BYTES_A_PIXEL;
+        match free_memory() {
+            Some(free) if needed > free => Err(Failure::Argument(format!(
+                "a picture of {width}x{height} pixels needs some {:.1} GB of memory, and {:.1} GB are free; ask for a \
+                 smaller one with --size",
+                needed as f64 * 1e-9,
+                free as f64 * 1e-9
+            ))),
+            _ => Ok(Some(self.size)),
+        }
+    }
+
     /// The scene asked for, and how many bodies it is to have.
     pub(crate) fn scene(&self) -> Result<(&'static StandardScene, usize), Failure> {
         let Some(scene) = self.scene.as_deref().and_then(scenes::find) else {
@@ -160,6 +192,13 @@ pub(crate) fn parse() -> Result<Args, Failure> {
 fn whole(text: &str, most: u32) -> Result<u32, String> {
     let number = text.parse().ok().filter(|n| (1..=most).contains(n));
     number.ok_or_else(|| format!("expected a whole number from 1 to {most}"))
+}
+
+/// Two whole numbers with an `x` between them.
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let number = |text: &str| text.parse().ok().filter(|n| (1..=MOST_PIXELS).contains(n));
+    let size = text.split_once('x').and_then(|(width, height)| Some((number(width)?, number(height)?)));
+    size.ok_or_else(|| format!("expected width and height in pixels as in 1280x720, each 1 to {MOST_PIXELS}"))
 }
 
 /// What clap says, without its usage lines.

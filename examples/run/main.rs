@@ -5,11 +5,13 @@
 
 mod args;
 mod outcome;
+mod pictures;
 mod trace;
 
 use args::{Args, Failure};
 use indicatif::{ProgressBar, ProgressStyle};
 use outcome::Outcome;
+use pictures::{Frames, Pictures};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::Path;
@@ -57,16 +59,30 @@ fn run(args: &Args) -> Result<(), Failure> {
     let params = args.params()?;
     let (standard, bodies) = args.scene()?;
     // Before the run, so that a bad path costs no time.
+    let size = args.picture_size()?;
     let mut json = args.json.as_deref().map(open).transpose()?;
     let mut trace_file = args.trace.as_deref().map(open).transpose()?;
+    let mut png = args.png.as_deref().map(open).transpose()?;
+    args.frames.as_deref().map(pictures::make_folder).transpose()?;
     let mut world = World::new((standard.build)(bodies), params, args.backend())?;
     #[cfg(feature = "cpu")]
     if matches!((args.backend(), &world), (Backend::Auto, World::Cpu(_))) {
         tell("no GPU can be used (software adapters do not count here): running on the CPU");
     }
     let mut outcome = Outcome::new(standard.name, args.steps, &params, world.scene());
+    let mut pictures = size.map(|size| Pictures::new(&world, size)).transpose()?;
+    let mut frames = match (&args.frames, &mut pictures) {
+        (Some(folder), Some(pictures)) => Some(Frames::begin(folder, pictures, &mut world)?),
+        _ => None,
+    };
+    // A full disk ends the pictures, and not the run.
+    let mut framed = Ok(());
     let mut trace = args.trace.is_some().then(|| Trace::new(standard.name));
-    take_steps(&mut world, &mut outcome, trace.as_mut())?;
+    take_steps(&mut world, &mut outcome, trace.as_mut(), |number, world| {
+        if let (Ok(()), Some(frames), Some(pictures)) = (&framed, &mut frames, &mut pictures) {
+            framed = frames.take(f64::from(number) * f64::from(params.dt), pictures, world);
+        }
+    })?;
 
     let spinner = ProgressBar::new_spinner().with_message("measuring the overlap");
     spinner.enable_steady_tick(Duration::from_millis(100));
@@ -77,15 +93,32 @@ fn run(args: &Args) -> Result<(), Failure> {
     spinner.finish_and_clear();
 
     // The table last and in any case: a full disk does not take the result of a long run away.
-    let traced =
-        trace_file.as_mut().zip(trace).map_or(Ok(()), |((file, path), trace)| write(file, path, &trace.json()));
-    let written = json.as_mut().map_or(Ok(()), |(file, path)| write(file, path, &format!("{:#}\n", outcome.json())));
+    let written = json.as_mut().map_or(Ok(()), |(file, path)| {
+        let text = format!("{:#}\n", outcome.json());
+        write(file, path, text.as_bytes())
+    });
+    let traced = trace_file
+        .as_mut()
+        .zip(trace)
+        .map_or(Ok(()), |((file, path), trace)| write(file, path, trace.json().as_bytes()));
+    let drawn = match (&mut png, &mut pictures) {
+        (Some((file, path)), Some(pictures)) => {
+            let camera = pictures.camera(&world, &poses);
+            pictures.png(&mut world, &camera).and_then(|picture| write(file, path, &picture))
+        }
+        _ => Ok(()),
+    };
     print(&outcome.table())?;
-    written.and(traced)
+    written.and(traced).and(framed).and(drawn)
 }
 
-/// Runs the steps and notes what each took.
-fn take_steps(world: &mut World, outcome: &mut Outcome, mut trace: Option<&mut Trace>) -> Result<(), Failure> {
+/// Runs the steps and notes what each took; calls `after` with the number of each, which does not count in its time.
+fn take_steps(
+    world: &mut World,
+    outcome: &mut Outcome,
+    mut trace: Option<&mut Trace>,
+    mut after: impl FnMut(u32, &mut World),
+) -> Result<(), Failure> {
     let bar = progress_bar(outcome.steps)?;
     for number in 1..=outcome.steps {
         let begin = Instant::now();
@@ -103,6 +136,7 @@ fn take_steps(world: &mut World, outcome: &mut Outcome, mut trace: Option<&mut T
                 return Err(Failure::Run(format!("step {number}: {error}")));
             }
         }
+        after(number, world);
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -124,13 +158,13 @@ fn open(path: &Path) -> Result<(File, &Path), Failure> {
     }
 }
 
-fn write(file: &mut File, path: &Path, text: &str) -> Result<(), Failure> {
+fn write(file: &mut File, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let mut replace = || {
         // What is no regular file, such as a pipe, has no length to cut.
         if file.metadata()?.is_file() {
             file.set_len(0)?;
         }
-        file.write_all(text.as_bytes())?;
+        file.write_all(bytes)?;
         file.flush()
     };
     replace().map_err(|error| cannot_write(path, &error))

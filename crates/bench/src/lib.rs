@@ -5,5 +5,6 @@ pub mod cases;
 pub mod engines;
 pub mod machine;
 pub mod record;
+pub mod report;
 pub mod run;
 pub mod scaling;
