@@ -76,6 +76,10 @@ pub(crate) struct Args {
     /// Write the same as the table to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
+    /// Write a trace of the last 10,000 steps to this file, for https://ui.perfetto.dev or chrome://tracing; times each
+    /// pass as `--profile` does
+    #[arg(long, value_name = "FILE")]
+    pub(crate) trace: Option<PathBuf>,
     /// Write a picture of the last state to this file, as PNG
     #[arg(long, value_name = "FILE")]
     pub(crate) png: Option<PathBuf>,
@@ -112,7 +116,7 @@ enum BroadphaseName {
 impl Args {
     /// Refused if no step can run with them.
     pub(crate) fn params(&self) -> Result<Params, Failure> {
-        let mut params = Params { profile: self.profile, ..Params::default() };
+        let mut params = Params { profile: self.profile || self.trace.is_some(), ..Params::default() };
         params.dt = self.dt.unwrap_or(params.dt);
         params.substeps = self.substeps.unwrap_or(params.substeps);
         params.threads = self.threads.map(|n| n as usize);

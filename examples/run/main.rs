@@ -6,6 +6,7 @@
 mod args;
 mod outcome;
 mod pictures;
+mod trace;
 
 use args::{Args, Failure};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -16,6 +17,7 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
+use trace::Trace;
 use tumble::core::{measures, scenes};
 use tumble::{Backend, World};
 
@@ -59,6 +61,7 @@ fn run(args: &Args) -> Result<(), Failure> {
     // Before the run, so that a bad path costs no time.
     let size = args.picture_size()?;
     let mut json = args.json.as_deref().map(open).transpose()?;
+    let mut trace_file = args.trace.as_deref().map(open).transpose()?;
     let mut png = args.png.as_deref().map(open).transpose()?;
     args.frames.as_deref().map(pictures::make_folder).transpose()?;
     let mut world = World::new((standard.build)(bodies), params, args.backend())?;
@@ -74,7 +77,8 @@ fn run(args: &Args) -> Result<(), Failure> {
     };
     // A full disk ends the pictures, and not the run.
     let mut framed = Ok(());
-    take_steps(&mut world, &mut outcome, |number, world| {
+    let mut trace = args.trace.is_some().then(|| Trace::new(standard.name));
+    take_steps(&mut world, &mut outcome, trace.as_mut(), |number, world| {
         if let (Ok(()), Some(frames), Some(pictures)) = (&framed, &mut frames, &mut pictures) {
             framed = frames.take(f64::from(number) * f64::from(params.dt), pictures, world);
         }
@@ -93,6 +97,10 @@ fn run(args: &Args) -> Result<(), Failure> {
         let text = format!("{:#}\n", outcome.json());
         write(file, path, text.as_bytes())
     });
+    let traced = trace_file
+        .as_mut()
+        .zip(trace)
+        .map_or(Ok(()), |((file, path), trace)| write(file, path, trace.json().as_bytes()));
     let drawn = match (&mut png, &mut pictures) {
         (Some((file, path)), Some(pictures)) => {
             let camera = pictures.camera(&world, &poses);
@@ -101,18 +109,28 @@ fn run(args: &Args) -> Result<(), Failure> {
         _ => Ok(()),
     };
     print(&outcome.table())?;
-    written.and(framed).and(drawn)
+    written.and(traced).and(framed).and(drawn)
 }
 
 /// Runs the steps and notes what each took; calls `after` with the number of each, which does not count in its time.
-fn take_steps(world: &mut World, outcome: &mut Outcome, mut after: impl FnMut(u32, &mut World)) -> Result<(), Failure> {
+fn take_steps(
+    world: &mut World,
+    outcome: &mut Outcome,
+    mut trace: Option<&mut Trace>,
+    mut after: impl FnMut(u32, &mut World),
+) -> Result<(), Failure> {
     let bar = progress_bar(outcome.steps)?;
     for number in 1..=outcome.steps {
         let begin = Instant::now();
         let report = world.step().and_then(|()| world.sync());
         let milliseconds = begin.elapsed().as_secs_f64() * 1e3;
         match report {
-            Ok(report) => outcome.add(milliseconds, report),
+            Ok(report) => {
+                if let Some(trace) = &mut trace {
+                    trace.add(begin, milliseconds, &report);
+                }
+                outcome.add(milliseconds, report);
+            }
             Err(error) => {
                 bar.finish_and_clear();
                 return Err(Failure::Run(format!("step {number}: {error}")));

@@ -6,6 +6,7 @@
 
 mod builder;
 mod choice;
+pub mod contacts;
 pub mod edit;
 mod error;
 mod handle;
@@ -22,11 +23,14 @@ mod report;
 mod scene;
 pub mod scenes;
 mod shape;
+#[doc(hidden)]
+pub mod stopwatch;
 pub mod validate;
 pub mod wear;
 
 pub use builder::{ColliderBuilder, CombineRule, RigidBodyBuilder, RigidBodyType};
 pub use choice::Spread;
+pub use contacts::{Contact, ContactPoint, Contacts};
 pub use edit::Editor;
 pub use error::{Error, Result};
 pub use handle::{BodyHandle, ColliderHandle, Inserted};
@@ -36,7 +40,7 @@ pub use params::{Broadphase, Capacities, MortonBits, Params, Traversal};
 pub use plan::Plan;
 pub use poses::{Pose, Poses, Velocities, Velocity};
 pub use query::{Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Ray, RayHit};
-pub use report::{Penetration, StageTime, StepReport};
+pub use report::{Penetration, StageRun, StageTime, StepReport};
 pub use scene::Scene;
 pub use shape::Shape;
 

@@ -1,5 +1,6 @@
 //! A world on the CPU: the face, capacity and the edit log. What it keeps, and the order of the passes, is in `kept`.
 
+mod contacts;
 mod kept;
 mod queries;
 
@@ -9,10 +10,10 @@ use crate::solver::Rows;
 use bytemuck::Zeroable;
 use glam::Vec3;
 use kept::{Asked, Kept, Overflow};
-use std::time::Instant;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{Control, PoseRecord, StepParams};
 use tumble_core::limits::{self, Room};
+use tumble_core::stopwatch::{Span, Stopwatch};
 use tumble_core::{Broadphase, Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
 
 /// A scene of no more colliders runs on the caller's thread: none of its passes is long enough to be shared, and waking
@@ -34,28 +35,11 @@ pub struct World {
     /// How far colliders lay apart in the step of this number.
     extent: Option<(u32, Vec3)>,
     queries: query::Cached,
+    watch: Stopwatch,
+    /// What the last committed step was told.
+    last_step: StepParams,
     /// Why the last step did not run.
     failed: Option<Error>,
-}
-
-/// Milliseconds by stage, when asked for.
-struct Stopwatch {
-    last: Option<Instant>,
-    stages: Vec<StageTime>,
-}
-
-impl Stopwatch {
-    fn new(on: bool) -> Self {
-        Self { last: on.then(Instant::now), stages: Vec::new() }
-    }
-    fn lap(&mut self, stage: &'static str) {
-        if let Some(last) = &mut self.last {
-            let now = Instant::now();
-            let milliseconds = Some((now - *last).as_secs_f64() * 1e3);
-            self.stages.push(StageTime { stage, milliseconds });
-            *last = now;
-        }
-    }
 }
 
 impl World {
@@ -99,6 +83,8 @@ impl World {
             finder: Finder::default(),
             extent: None,
             queries: query::Cached::default(),
+            watch: Stopwatch::default(),
+            last_step: StepParams::zeroed(),
             failed: None,
         })
     }
@@ -143,6 +129,8 @@ impl World {
     /// [`Error::Capacity`] when it needs more room than it may have: the step did not run, its edits wait for the next
     /// call, and the last good state stays readable.
     pub fn step(&mut self) -> Result<()> {
+        let span = Span::enter("step");
+        self.watch.start(self.params.profile);
         let needed = Room {
             bodies: self.editor.body_slots() as u32,
             colliders: self.editor.collider_slots() as u32,
@@ -164,7 +152,7 @@ impl World {
         step.cell_table_bits = limits::cell_table_bits(step.collider_count);
         step.large_limit = limits::large_limit(step.collider_count, self.editor.spread().is_wide());
         step.drop_pair = self.drop_pair;
-        self.failed = self.run(&edits, step).err();
+        self.failed = self.run(&edits, step, &span).err();
         if let Some(error) = self.failed.clone() {
             self.editor.put_back(edits);
             return Err(error);
@@ -197,29 +185,37 @@ impl World {
     }
 
     /// Plans and commits a step, growing the pair list between where that is needed and allowed.
-    fn run(&mut self, edits: &EditBatch, mut step: StepParams) -> Result<()> {
+    fn run(&mut self, edits: &EditBatch, mut step: StepParams, span: &Span) -> Result<()> {
         let restitution = self.editor.plan().restitution;
         let broadphase = self.params.broadphase.resolve(self.editor.spread());
         loop {
-            let mut watch = Stopwatch::new(self.params.profile);
+            let attempt = self.watch.runs().len();
             step.pair_capacity = (self.kept.impulses.len() / 4) as u32;
-            let (kept, pool, finder) = (&mut self.kept, &self.pool, &mut self.finder);
+            let (kept, pool, finder, watch) = (&mut self.kept, &self.pool, &mut self.finder, &mut self.watch);
             let asked = Asked { edits, params: &self.params, broadphase };
             let mut planned_and_committed = || {
-                let planned = kept.plan(&asked, finder, &step, &mut watch)?;
-                kept.commit(planned, &step, restitution, &mut watch);
+                let planned = kept.plan(&asked, finder, &step, watch)?;
+                kept.commit(planned, &step, restitution, watch);
                 Ok(())
             };
             let run = match step.collider_count <= ALONE {
                 true => planned_and_committed(),
-                false => pool.install(planned_and_committed),
+                false => pool.install(|| {
+                    let _span = span.enter_again();
+                    planned_and_committed()
+                }),
             };
             match run {
                 Ok(()) => {
-                    self.finish(watch, broadphase);
+                    self.last_step = step;
+                    self.finish(attempt, broadphase);
                     return Ok(());
                 }
-                Err(overflow) => self.grow(overflow)?,
+                Err(overflow) => {
+                    let growth = self.watch.begin("growth");
+                    self.grow(overflow)?;
+                    self.watch.end(growth);
+                }
             }
         }
     }
@@ -242,7 +238,8 @@ impl World {
         }
     }
 
-    fn finish(&mut self, watch: Stopwatch, broadphase: Broadphase) {
+    /// `attempt`: where the runs of the one that went through begin.
+    fn finish(&mut self, attempt: usize, broadphase: Broadphase) {
         let mut report = StepReport::from_control(&self.kept.control);
         report.backend = "cpu";
         report.adapter = self.adapter.clone();
@@ -251,7 +248,8 @@ impl World {
         report.broadphase = broadphase;
         report.broadphase_bytes = self.finder.bytes();
         report.memory_bytes = self.kept.bytes() + self.finder.bytes() + self.queries.bytes();
-        report.stages = watch.stages;
+        report.stages = StageTime::sums(&self.watch.runs()[attempt..]);
+        report.host_runs = self.watch.runs().to_vec();
         self.report = report;
     }
 }

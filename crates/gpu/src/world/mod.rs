@@ -2,6 +2,7 @@
 
 mod growth;
 mod queries;
+mod results;
 
 use crate::broadphase::Choice;
 use crate::query::Query;
@@ -14,9 +15,10 @@ use glam::Vec3;
 use growth::within;
 use std::collections::VecDeque;
 use tumble_core::edit::EditBatch;
-use tumble_core::layout::{BodyState, Control, LAST_BATCH, Pair, PoseRecord, StepParams};
+use tumble_core::layout::{Control, LAST_BATCH, Pair, PoseRecord, StepParams};
 use tumble_core::limits::{self, Room};
-use tumble_core::{Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
+use tumble_core::stopwatch::{Span, Stopwatch};
+use tumble_core::{Editor, Params, Poses, Result, Scene, StageRun, StageTime, StepReport};
 
 /// Steps in flight before `step` waits.
 const IN_FLIGHT: usize = 3;
@@ -53,11 +55,16 @@ pub struct World {
     waiting: VecDeque<Record>,
     submitted: u32,
     last: Control,
+    /// What the last committed step was told.
+    last_step: StepParams,
+    /// Most pairs that a step had.
+    most_pairs: u32,
     /// Batches that were worth a dispatch in the step of this number, for the last few.
     batches: VecDeque<(u32, u32)>,
     /// How far colliders lay apart in the step of this number.
     extent: Option<(u32, Vec3)>,
-    stage_times: Vec<StageTime>,
+    device_runs: Vec<StageRun>,
+    watch: Stopwatch,
     growths: Vec<(&'static str, u32)>,
     drop_pair: u32,
     /// From the first query on.
@@ -75,8 +82,9 @@ impl World {
     /// Loads a scene onto the best adapter there is, a software one too.
     ///
     /// # Errors
-    /// What is wrong with the scene or the parameters; [`Error::NoAdapter`]; [`Error::Limits`] and
-    /// [`Error::OutOfMemory`] when the adapter is too small for the scene.
+    /// What is wrong with the scene or the parameters; [`Error::NoAdapter`](tumble_core::Error::NoAdapter);
+    /// [`Error::Limits`](tumble_core::Error::Limits) and [`Error::OutOfMemory`](tumble_core::Error::OutOfMemory) when the
+    /// adapter is too small for the scene.
     pub fn new(scene: Scene, params: Params) -> Result<Self> {
         Self::with_gpu(Gpu::any()?, scene, params)
     }
@@ -112,7 +120,10 @@ impl World {
             packed.states.iter().zip(&packed.props).map(|(s, p)| PoseRecord::of(s, p)).collect();
         gpu.queue.write_buffer(buffers.buffer("poses")?, 0, bytemuck::cast_slice(&poses));
         let built = Built { plan: packed.plan, choice: Choice::new(&params, &editor) };
-        let stages = Stages::new(&gpu, &mut pipelines, &sizes, &built)?;
+        let stages = {
+            let _span = Span::enter("pipelines");
+            Stages::new(&gpu, &mut pipelines, &sizes, &built)?
+        };
         let timer = if params.profile { Timer::new(&gpu)? } else { None };
         let control_bytes = size_of::<Control>() as u64;
         Ok(Self {
@@ -124,9 +135,12 @@ impl World {
             waiting: VecDeque::new(),
             submitted: 0,
             last: Control::zeroed(),
+            last_step: StepParams::zeroed(),
+            most_pairs: 0,
             batches: VecDeque::new(),
             extent: None,
-            stage_times: Vec::new(),
+            device_runs: Vec::new(),
+            watch: Stopwatch::default(),
             growths: Vec::new(),
             drop_pair: u32::MAX,
             built,
@@ -162,7 +176,7 @@ impl World {
     /// Parameters from the next step on.
     ///
     /// # Errors
-    /// [`Error::Invalid`] names the field.
+    /// [`Error::Invalid`](tumble_core::Error::Invalid) names the field.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
         params.validate()?;
         if params.profile && self.timer.is_none() {
@@ -207,10 +221,13 @@ impl World {
     /// Submits one step. Waits only when three are in flight.
     ///
     /// # Errors
-    /// [`Error::Capacity`] when this step or an earlier one needs more room than it may have: nothing is submitted, the
-    /// edits wait for the next call, and the last good state stays readable. [`Error::DeviceLost`],
-    /// [`Error::OutOfMemory`] and [`Error::Gpu`] from the device.
+    /// [`Error::Capacity`](tumble_core::Error::Capacity) when this step or an earlier one needs more room than it may
+    /// have: nothing is submitted, the edits wait for the next call, and the last good state stays readable.
+    /// [`Error::DeviceLost`](tumble_core::Error::DeviceLost), [`Error::OutOfMemory`](tumble_core::Error::OutOfMemory) and
+    /// [`Error::Gpu`](tumble_core::Error::Gpu) from the device.
     pub fn step(&mut self) -> Result<()> {
+        let _span = Span::enter("step");
+        self.watch.start(self.params.profile);
         self.run_waiting()?;
         self.take_statuses(IN_FLIGHT - 1)?;
         let (bodies, colliders) = (self.editor.body_slots() as u32, self.editor.collider_slots() as u32);
@@ -241,62 +258,6 @@ impl World {
         Ok(self.report())
     }
 
-    /// Waits for all submitted steps; the pose of every body, in one download.
-    ///
-    /// # Errors
-    /// As for [`World::step`]; once that was told, the last good poses.
-    pub fn poses(&mut self) -> Result<Poses> {
-        self.take_statuses(0)?;
-        let bytes = read_now(&self.gpu, self.buffers.buffer("poses")?, 0, pose_bytes(&self.sizes))?;
-        Ok(self.poses_of(self.last.step, &bytes))
-    }
-
-    /// The newest poses that have arrived, without waiting; `None` before the first have. Each call asks for new ones.
-    /// Those that arrived before the device was lost stay.
-    ///
-    /// # Errors
-    /// As for [`World::step`].
-    pub fn try_poses(&mut self) -> Result<Option<Poses>> {
-        match self.fetch_poses() {
-            Err(Error::DeviceLost { .. }) if self.newest_poses.is_some() => {}
-            done => done?,
-        }
-        Ok(self.newest_poses.clone())
-    }
-
-    /// Takes what poses have arrived and asks for new ones.
-    fn fetch_poses(&mut self) -> Result<()> {
-        if let Some(bytes) = self.pose_copies.try_take(&self.gpu)? {
-            let control = self.step_copies.wait_take(&self.gpu)?.unwrap_or_default();
-            self.newest_poses = Some(self.poses_of(read_control(&control).step, &bytes));
-        }
-        if self.submitted > 0 && !self.pose_copies.is_full() {
-            let (poses, control) = (self.buffers.buffer("poses")?, self.buffers.buffer("control")?);
-            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-            self.pose_copies.copy(&mut encoder, poses, 0);
-            self.step_copies.copy(&mut encoder, control, 0);
-            let index = self.gpu.scoped("a copy of the poses", || self.gpu.queue.submit([encoder.finish()]))?;
-            self.pose_copies.submitted(&index);
-            self.step_copies.submitted(&index);
-        }
-        Ok(())
-    }
-
-    /// Waits for all submitted steps; the velocity of every body, in one download.
-    ///
-    /// # Errors
-    /// As for [`World::poses`].
-    pub fn velocities(&mut self) -> Result<Velocities> {
-        self.take_statuses(0)?;
-        let bytes = u64::from(self.sizes.bodies) * size_of::<BodyState>() as u64;
-        let bytes = read_now(&self.gpu, self.buffers.buffer("states")?, 0, bytes)?;
-        Ok(Velocities::from_states(self.last.step.into(), &bytemuck::pod_collect_to_vec::<u8, BodyState>(&bytes)))
-    }
-
-    fn poses_of(&self, step: u32, bytes: &[u8]) -> Poses {
-        Poses::from_records(step.into(), &bytemuck::pod_collect_to_vec::<u8, PoseRecord>(bytes))
-    }
-
     fn report(&self) -> StepReport {
         let mut report = StepReport::from_control(&self.last);
         report.backend = "gpu";
@@ -307,7 +268,9 @@ impl World {
         report.broadphase_bytes = self.stages.broadphase.bytes();
         report.memory_bytes = self.buffers.bytes() + self.stages.bytes();
         report.memory_bytes += self.query.as_ref().map_or(0, Query::bytes);
-        report.stages = self.stage_times.clone();
+        report.stages = StageTime::sums(&self.device_runs);
+        report.host_runs = self.watch.runs().to_vec();
+        report.device_runs = self.device_runs.clone();
         report
     }
 
@@ -317,7 +280,9 @@ impl World {
         let widened = wanted.plan.widen(&record.wants.plan);
         if widened || wanted.choice != record.wants.choice {
             wanted.choice = record.wants.choice;
+            let run = self.watch.begin("pipelines");
             self.stages = Stages::new(&self.gpu, &mut self.pipelines, &self.sizes, &wanted)?;
+            self.watch.end(run);
             self.built = wanted;
         }
         let step = &mut record.step;
@@ -326,13 +291,17 @@ impl World {
         // dispatch a batch is in: the bits are the same.)
         let known = self.batches.iter().find(|(number, _)| number + IN_FLIGHT as u32 == step.step);
         step.wide_batches = known.map_or(WIDE_BATCHES, |(_, count)| *count);
+        let run = self.watch.begin("upload");
         self.upload(&record)?;
         self.stages.prepare(&self.gpu, &record.step, record.edits.stale)?;
+        let run = self.watch.next(run, "record");
         let timer = if self.params.profile { self.timer.as_mut() } else { None };
         let mut recorder = Recorder::new(&self.gpu, &self.buffers, &mut self.cache, timer);
         self.stages.record(&mut recorder, &self.buffers, &record.step)?;
         self.statuses.copy(recorder.encoder(), self.buffers.buffer("control")?, 0);
+        let run = self.watch.next(run, "submit");
         let index = recorder.submit()?;
+        self.watch.end(run);
         self.statuses.submitted(&index);
         self.flying.push_back(record);
         Ok(())
@@ -351,7 +320,10 @@ impl World {
     fn take_statuses(&mut self, most: usize) -> Result<()> {
         while !self.flying.is_empty() {
             let taken = if self.flying.len() > most {
-                self.statuses.wait_take(&self.gpu)?
+                let run = self.watch.begin("wait");
+                let taken = self.statuses.wait_take(&self.gpu)?;
+                self.watch.end(run);
+                taken
             } else {
                 self.statuses.try_take(&self.gpu)?
             };
@@ -367,6 +339,8 @@ impl World {
                 }
                 self.stages.broadphase.walked(record.step.step, status.turns);
                 self.batches.push_back((record.step.step, wide_batches(&status)));
+                self.last_step = record.step;
+                self.most_pairs = self.most_pairs.max(status.old_pair_count);
                 if self.batches.len() > 2 * IN_FLIGHT {
                     self.batches.pop_front();
                 }
@@ -374,9 +348,11 @@ impl World {
             self.last = status;
         }
         if let Some(timer) = &mut self.timer {
-            while let Some(times) = timer.take(&self.gpu, most == 0)? {
-                self.stage_times = times;
+            let run = self.watch.begin("readback");
+            while let Some(runs) = timer.take(&self.gpu, most == 0)? {
+                self.device_runs = runs;
             }
+            self.watch.end(run);
         }
         self.gpu.check()
     }
