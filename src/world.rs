@@ -1,8 +1,8 @@
 //! One face for the CPU and the GPU world.
 
 use tumble_core::{
-    Editor, Nearest, NearestQuery, OverlapShape, Overlaps, Params, Poses, Ray, RayHit, Result, Scene, StepReport,
-    Velocities,
+    Contacts, Editor, Nearest, NearestQuery, OverlapShape, Overlaps, Params, Poses, Ray, RayHit, Result, Scene,
+    StepReport, Velocities,
 };
 
 /// Where a world runs.
@@ -111,6 +111,38 @@ impl World {
     /// Waits for all submitted steps; the velocity of every body, in one download.
     pub fn velocities(&mut self) -> Result<Velocities> {
         either!(self, world => world.velocities())
+    }
+
+    /// Waits for all submitted steps; the contacts of the last one with what they pushed, in one download. None before
+    /// the first step. Edits are seen once a step has applied them: a body that was removed since has its contacts
+    /// still.
+    ///
+    /// ```
+    /// use tumble::prelude::*;
+    ///
+    /// # fn main() -> Result<()> {
+    /// let mut scene = Scene::new();
+    /// scene.insert(RigidBodyBuilder::fixed(), ColliderBuilder::halfspace(Vec3::Y));
+    /// let ball = RigidBodyBuilder::dynamic().translation(Vec3::new(0.0, 0.5, 0.0));
+    /// let ball = scene.insert(ball, ColliderBuilder::ball(0.5).density(1000.0));
+    /// let mut world = World::new(scene, Params::default(), Backend::Auto)?;
+    /// for _ in 0..60 {
+    ///     world.step()?;
+    /// }
+    /// let contacts = world.contacts()?;
+    /// let on_ball = contacts.all.iter().filter(|contact| contact.body_b == ball.body);
+    /// let force: Vec3 = on_ball.map(|contact| contact.impulse() / contacts.dt).sum();
+    ///
+    /// let weight = 1000.0 * 4.0 / 3.0 * std::f32::consts::PI * 0.5f32.powi(3) * 9.81;
+    /// assert!((force - weight * Vec3::Y).length() < 1e-3 * weight);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Capacity`](crate::Error::Capacity) when a step wants for room. What a device may refuse.
+    pub fn contacts(&mut self) -> Result<Contacts> {
+        either!(self, world => world.contacts())
     }
 
     /// The first collider that each ray meets, or none; in the order of the rays. Where two are met at the same time, the

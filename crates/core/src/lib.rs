@@ -6,6 +6,7 @@
 
 mod builder;
 mod choice;
+pub mod contacts;
 pub mod edit;
 mod error;
 mod handle;
@@ -27,6 +28,7 @@ pub mod wear;
 
 pub use builder::{ColliderBuilder, CombineRule, RigidBodyBuilder, RigidBodyType};
 pub use choice::Spread;
+pub use contacts::{Contact, ContactPoint, Contacts};
 pub use edit::Editor;
 pub use error::{Error, Result};
 pub use handle::{BodyHandle, ColliderHandle, Inserted};

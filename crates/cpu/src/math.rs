@@ -2,6 +2,7 @@
 
 use glam::{Quat, Vec3};
 use tumble_core::layout::SolverBody;
+pub(crate) use tumble_core::layout::tangents;
 
 pub(crate) fn vec3(v: [f32; 3]) -> Vec3 {
     Vec3::from_array(v)
@@ -33,12 +34,4 @@ pub(crate) fn inverse_inertia_times(body: &SolverBody, v: Vec3) -> Vec3 {
     let [xx, yy, zz] = body.inverse_inertia_diagonal;
     let [xy, xz, yz] = body.inverse_inertia_off;
     Vec3::new(xx * v.x + xy * v.y + xz * v.z, xy * v.x + yy * v.y + yz * v.z, xz * v.x + yz * v.y + zz * v.z)
-}
-
-/// Two unit vectors that make a frame with `n`. They jump where |n.x| passes 0.577, far from the axes along which
-/// contacts mostly lie, so that a resting contact keeps its frame.
-pub(crate) fn tangents(n: Vec3) -> (Vec3, Vec3) {
-    let t = if n.x.abs() < 0.577_350_3 { Vec3::new(0.0, n.z, -n.y) } else { Vec3::new(n.y, -n.x, 0.0) };
-    let t = t.normalize();
-    (t, n.cross(t))
 }

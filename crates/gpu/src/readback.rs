@@ -187,15 +187,33 @@ impl Readback {
 /// # Errors
 /// As for [`Gpu::create_buffer`] and [`Readback::wait_take`].
 pub fn read_now(gpu: &Gpu, source: &wgpu::Buffer, offset: u64, bytes: u64) -> Result<Vec<u8>> {
-    if bytes == 0 {
-        return Ok(Vec::new());
+    let [read] = read_parts(gpu, [(source, offset, bytes)])?;
+    Ok(read)
+}
+
+/// Reads parts of buffers, each given with its first byte and its bytes (multiples of 4), in one submission, and waits
+/// for them.
+pub(crate) fn read_parts<const N: usize>(gpu: &Gpu, parts: [(&wgpu::Buffer, u64, u64); N]) -> Result<[Vec<u8>; N]> {
+    let mut read = [const { Vec::new() }; N];
+    let wanted = parts.iter().map(|&(.., bytes)| (bytes > 0).then(|| Readback::new(gpu, "read", bytes, 1)).transpose());
+    let mut readbacks = wanted.collect::<Result<Vec<_>>>()?;
+    if readbacks.iter().all(Option::is_none) {
+        return Ok(read);
     }
-    let mut readback = Readback::new(gpu, "read", bytes, 1)?;
     let index = gpu.scoped("a read-back", || {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        readback.copy(&mut encoder, source, offset);
+        for (readback, (source, offset, _)) in readbacks.iter_mut().zip(parts) {
+            if let Some(readback) = readback {
+                readback.copy(&mut encoder, source, offset);
+            }
+        }
         gpu.queue.submit([encoder.finish()])
     })?;
-    readback.submitted(&index);
-    Ok(readback.wait_take(gpu)?.unwrap_or_default())
+    for (readback, read) in readbacks.iter_mut().zip(&mut read) {
+        if let Some(readback) = readback {
+            readback.submitted(&index);
+            *read = readback.wait_take(gpu)?.unwrap_or_default();
+        }
+    }
+    Ok(read)
 }

@@ -1,4 +1,5 @@
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 
 /// What the points of one constraint share. 48 bytes. Constraints lie in batch order.
 #[repr(C)]
@@ -54,8 +55,16 @@ pub struct ConstraintPoint {
 pub struct Impulse {
     /// N s, never negative.
     pub normal: f32,
-    /// Along the two tangents that `tangents(normal)` gives, N s.
+    /// Along the two tangents that [`tangents`] gives, N s.
     pub tangent: [f32; 2],
     /// Feature that it belongs to.
     pub feature: u32,
+}
+
+/// Two unit vectors that make a frame with `n`. They jump where |n.x| passes 0.577, far from the axes along which
+/// contacts mostly lie, so that a resting contact keeps its frame.
+pub fn tangents(n: Vec3) -> (Vec3, Vec3) {
+    let t = if n.x.abs() < 0.577_350_3 { Vec3::new(0.0, n.z, -n.y) } else { Vec3::new(n.y, -n.x, 0.0) };
+    let t = t.normalize();
+    (t, n.cross(t))
 }

@@ -15,7 +15,7 @@ mod tree;
 
 pub use body::{BodyProps, BodyState, PoseRecord, SolverBody, body_flags, pose_tag};
 pub use collider::{Aabb, Collider, aabb_body, shape_kind};
-pub use constraint::{ConstraintHead, ConstraintPoint, Impulse};
+pub use constraint::{ConstraintHead, ConstraintPoint, Impulse, tangents};
 pub use control::{BATCHES, Control, LAST_BATCH, QUARANTINE_NAMES, UNBATCHED, overflow};
 pub use edit::{EditRange, EditRecord, edit_op};
 pub use manifold::{FoundManifold, Manifold, ManifoldPoint, NO_SLOT, Pair, pair_kind};

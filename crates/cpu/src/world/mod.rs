@@ -1,5 +1,6 @@
 //! A world on the CPU: the face, capacity and the edit log. What it keeps, and the order of the passes, is in `kept`.
 
+mod contacts;
 mod kept;
 mod queries;
 
@@ -30,6 +31,8 @@ pub struct World {
     /// How far colliders lay apart in the step of this number.
     extent: Option<(u32, Vec3)>,
     queries: query::Cached,
+    /// What the last committed step was told.
+    last_step: StepParams,
     /// Why the last step did not run.
     failed: Option<Error>,
 }
@@ -95,6 +98,7 @@ impl World {
             finder: Finder::default(),
             extent: None,
             queries: query::Cached::default(),
+            last_step: StepParams::zeroed(),
             failed: None,
         })
     }
@@ -205,6 +209,7 @@ impl World {
             match planned {
                 Ok(planned) => {
                     pool.install(|| kept.commit(planned, &step, restitution, &mut watch));
+                    self.last_step = step;
                     self.finish(watch, broadphase);
                     return Ok(());
                 }

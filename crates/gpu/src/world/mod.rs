@@ -1,5 +1,6 @@
 //! A world on the GPU: submission, the ring of statuses and the edit log. What grows is in `growth`.
 
+mod contacts;
 mod growth;
 mod queries;
 
@@ -53,6 +54,10 @@ pub struct World {
     waiting: VecDeque<Record>,
     submitted: u32,
     last: Control,
+    /// What the last committed step was told.
+    last_step: StepParams,
+    /// Most pairs that a step had.
+    most_pairs: u32,
     /// Batches that were worth a dispatch in the step of this number, for the last few.
     batches: VecDeque<(u32, u32)>,
     /// How far colliders lay apart in the step of this number.
@@ -124,6 +129,8 @@ impl World {
             waiting: VecDeque::new(),
             submitted: 0,
             last: Control::zeroed(),
+            last_step: StepParams::zeroed(),
+            most_pairs: 0,
             batches: VecDeque::new(),
             extent: None,
             stage_times: Vec::new(),
@@ -367,6 +374,8 @@ impl World {
                 }
                 self.stages.broadphase.walked(record.step.step, status.turns);
                 self.batches.push_back((record.step.step, wide_batches(&status)));
+                self.last_step = record.step;
+                self.most_pairs = self.most_pairs.max(status.old_pair_count);
                 if self.batches.len() > 2 * IN_FLIGHT {
                     self.batches.pop_front();
                 }

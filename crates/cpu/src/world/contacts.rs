@@ -1,0 +1,28 @@
+//! Contacts in bulk: see `tumble_core::contacts`.
+
+use super::World;
+use tumble_core::Result;
+use tumble_core::contacts::{Committed, Contacts};
+
+impl World {
+    /// All contacts of the last step, none before the first. Edits that no step has applied are not seen: a body that
+    /// was removed since has its contacts still.
+    ///
+    /// # Errors
+    /// [`Error::Capacity`](tumble_core::Error::Capacity) when the last step did not run for want of room: its edits are
+    /// half applied.
+    pub fn contacts(&mut self) -> Result<Contacts> {
+        self.failed.clone().map_or(Ok(()), Err)?;
+        let kept = &self.kept;
+        let committed = Committed {
+            step: &self.last_step,
+            states: &kept.states,
+            colliders: &kept.colliders,
+            pairs: &kept.pairs,
+            batch_of_slot: &kept.batch_of_slot,
+            found: &kept.found,
+            impulses: &kept.impulses,
+        };
+        Ok(committed.contacts(&self.editor))
+    }
+}
