@@ -1,13 +1,15 @@
 //! Takes a body by a point and pulls that point to where the cursor is.
 
 use tumble::core::MassProperties;
-use tumble::core::glam::{DMat3, DQuat, DVec3, Vec3};
+use tumble::core::glam::{DMat3, DVec3, Vec3};
 use tumble::{BodyHandle, Pose, Ray, Result, RigidBodyType, Shape, Velocity, World};
 
 /// Angular frequency of the spring, rad/s: within 1 % of the way after a third of a second.
 const STIFFNESS: f64 = 20.0;
 /// Rate at which a held body stops turning, 1/s.
 const TURNING: f64 = 4.0;
+/// Fastest that pulling turns a body, rad/s: a short arm would spin it like a top.
+const FASTEST_TURN: f64 = 10.0;
 /// Fastest that the point is pulled, m/s: faster bodies pass through thin ones.
 const FASTEST: f64 = 30.0;
 /// Fixed bodies that a pick looks through: a picture shows walls before the scene as glass.
@@ -26,7 +28,7 @@ pub(crate) struct Grab {
 /// What pulls a body for one step, world axes.
 #[derive(Debug, Clone, Copy)]
 struct Pull {
-    /// N, at the point that is held.
+    /// N, at the centre of mass.
     force: Vec3,
     /// N m.
     torque: Vec3,
@@ -83,8 +85,7 @@ impl Grab {
         let mass = scene.mass_properties(self.body)?;
         let dt = f64::from(world.params().dt);
         let pull = self.pull_of(&mass, &pose, &velocity, gravity.as_dvec3(), dt, target.as_dvec3());
-        let point = pose.translation + pose.rotation * self.point;
-        world.edit().add_force_at_point(self.body, pull.force, point)?;
+        world.edit().add_force(self.body, pull.force)?;
         world.edit().add_torque(self.body, pull.torque)
     }
 
@@ -95,9 +96,17 @@ impl Grab {
     /// v' = (v - h w² x) / (1 + h w)²
     /// ```
     ///
-    /// and the force that does so is F = K⁻¹ (v' - v - h g) / h, where K = 1/m - [r] I⁻¹ [r] tells what an impulse at the
-    /// arm r does to the velocity there. Mass thus drops out: a body of 1 g goes the same way as one of 10 t, and none
-    /// sags under its weight. As a force and not an impulse, so that it acts in every sub-step as gravity does.
+    /// The impulse at the point that does so is J = K⁻¹ (v' - v - h g), where K = 1/m - [r] I⁻¹ [r] tells what an impulse
+    /// at the arm r does to the velocity there. It turns the body too; that turning is damped and bounded, and what the
+    /// bound takes from the point's velocity is made up for at the centre of mass:
+    ///
+    /// ```text
+    /// turn' = bounded((turn + I⁻¹ (r x J)) / (1 + h c))
+    /// force = m (v' - turn' x r - velocity - h g) / h        torque = I (turn' - turn) / h
+    /// ```
+    ///
+    /// Mass thus drops out: a body of 1 g goes the same way as one of 10 t, and none sags under its weight. As forces and
+    /// not impulses, so that they act in every sub-step as gravity does.
     fn pull_of(
         &self,
         mass: &MassProperties,
@@ -108,18 +117,15 @@ impl Grab {
         target: DVec3,
     ) -> Pull {
         let rotation = pose.rotation.as_dquat().normalize();
-        let principal = DMat3::from_quat(rotation * DQuat::from(mass.principal_frame.as_dquat()).normalize());
+        let principal = DMat3::from_quat((rotation * mass.principal_frame.as_dquat()).normalize());
         let moments = mass.principal_inertia.as_dvec3();
         let inertia = principal * DMat3::from_diagonal(moments) * principal.transpose();
         let inverse_inertia = principal * DMat3::from_diagonal(1.0 / moments) * principal.transpose();
         let arm = rotation * (self.point - mass.center_of_mass).as_dvec3();
         let point = pose.translation.as_dvec3() + rotation * self.point.as_dvec3();
+        let (linear, turning) = (velocity.linear.as_dvec3(), velocity.angular.as_dvec3());
 
-        let turning = velocity.angular.as_dvec3();
-        let slowed = turning / (1.0 + h * TURNING);
-        let torque = inertia * (slowed - turning) / h;
-
-        let at_point = velocity.linear.as_dvec3() + slowed.cross(arm);
+        let at_point = linear + turning.cross(arm);
         let wanted = (at_point - h * STIFFNESS.powi(2) * (point - target)) / (1.0 + h * STIFFNESS).powi(2);
         let wanted = wanted.clamp_length_max(FASTEST);
         let cross = DMat3::from_cols(
@@ -127,8 +133,12 @@ impl Grab {
             DVec3::new(-arm.z, 0.0, arm.x),
             DVec3::new(arm.y, -arm.x, 0.0),
         );
-        let response = DMat3::from_diagonal(DVec3::splat(1.0 / f64::from(mass.mass))) - cross * inverse_inertia * cross;
-        let force = response.inverse() * (wanted - at_point - h * gravity) / h;
-        Pull { force: force.as_vec3(), torque: torque.as_vec3() }
+        let mass = f64::from(mass.mass);
+        let response = DMat3::from_diagonal(DVec3::splat(1.0 / mass)) - cross * inverse_inertia * cross;
+        let impulse = response.inverse() * (wanted - at_point - h * gravity);
+        let turned = (turning + inverse_inertia * arm.cross(impulse)) / (1.0 + h * TURNING);
+        let turned = turned.clamp_length_max(FASTEST_TURN);
+        let force = mass * (wanted - turned.cross(arm) - linear - h * gravity) / h;
+        Pull { force: force.as_vec3(), torque: (inertia * (turned - turning) / h).as_vec3() }
     }
 }
