@@ -97,7 +97,9 @@ fn a_spring_brings_any_mass_to_the_cursor() {
                 let most = course.iter().fold(0.0, |most: f32, (share, _)| most.max(*share));
                 let side = course.iter().fold(0.0, |most: f32, (_, side)| most.max(*side));
                 let (share, left) = *course.last().unwrap();
-                eprintln!("{name} at {offset}, dt {dt:.4}: {most:.4} of the way, {side:.4} m aside; ends at {share:.4}");
+                eprintln!(
+                    "{name} at {offset}, dt {dt:.4}: {most:.4} of the way, {side:.4} m aside; ends at {share:.4}"
+                );
                 assert!(most < 1.03, "{name} at {offset}, dt {dt}: overshoots to {most}");
                 assert!((share - 1.0).abs() < 0.01 && left < 0.01, "{name} at {offset}, dt {dt}: {share}, {left}");
             }

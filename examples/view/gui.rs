@@ -24,8 +24,7 @@ impl Gui {
         let context = Context::default();
         context.set_theme(egui::Theme::Dark);
         let most = screen.device.limits().max_texture_dimension_2d as usize;
-        let state =
-            egui_winit::State::new(context.clone(), ViewportId::ROOT, &screen.window, None, None, Some(most));
+        let state = egui_winit::State::new(context.clone(), ViewportId::ROOT, &screen.window, None, None, Some(most));
         Self {
             state,
             renderer: egui_wgpu::Renderer::new(&screen.device, screen.format(), RendererOptions::default()),
@@ -49,7 +48,8 @@ impl Gui {
         let mut shown = None;
         let output = self.context.run_ui(input, |ui| shown = Some(show(ui.ctx())));
         self.state.handle_platform_output(window, output.platform_output);
-        self.repaint_in = output.viewport_output.get(&ViewportId::ROOT).map_or(Duration::MAX, |view| view.repaint_delay);
+        self.repaint_in =
+            output.viewport_output.get(&ViewportId::ROOT).map_or(Duration::MAX, |view| view.repaint_delay);
         self.textures.append(output.textures_delta);
         self.pixels_per_point = output.pixels_per_point;
         self.jobs = self.context.tessellate(output.shapes, output.pixels_per_point);
@@ -59,8 +59,7 @@ impl Gui {
     /// Draws the frame over what is in `view`.
     pub(crate) fn paint(&mut self, screen: &Screen, encoder: &mut wgpu::CommandEncoder, view: &wgpu::TextureView) {
         let (width, height) = screen.size();
-        let descriptor =
-            ScreenDescriptor { size_in_pixels: [width, height], pixels_per_point: self.pixels_per_point };
+        let descriptor = ScreenDescriptor { size_in_pixels: [width, height], pixels_per_point: self.pixels_per_point };
         for (id, deltas) in self.textures.set.drain() {
             for delta in &deltas {
                 self.renderer.update_texture(&screen.device, &screen.queue, id, delta);

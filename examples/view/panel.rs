@@ -8,7 +8,7 @@ use egui::{Align2, Button, Color32, Context, Frame, Grid, Rect, RichText, Slider
 use tumble::core::layout::LAST_BATCH;
 use tumble::{Params, StepReport};
 
-const PANEL: Color32 = Color32::from_rgba_premultiplied(17, 20, 25, 232);
+const PANEL: Color32 = Color32::from_rgb(19, 22, 27);
 const VALUE: Color32 = Color32::from_rgb(236, 239, 243);
 const BAD: Color32 = Color32::from_rgb(255, 92, 88);
 const SLOW: Color32 = Color32::from_rgb(250, 190, 80);
@@ -137,7 +137,8 @@ fn statistics(ui: &mut Ui, facts: &Facts) {
 fn switches(ui: &mut Ui, facts: &Facts, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         let pause = if facts.is_paused { "Run" } else { "Pause" };
-        let buttons = [(pause, Action::Pause), ("Step", Action::Step), ("Reset", Action::Reset), ("Frame", Action::Frame)];
+        let buttons =
+            [(pause, Action::Pause), ("Step", Action::Step), ("Reset", Action::Reset), ("Frame", Action::Frame)];
         for (text, action) in buttons {
             if ui.add(Button::new(text)).clicked() {
                 actions.push(action);

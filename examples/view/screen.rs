@@ -51,10 +51,11 @@ impl Screen {
         let inner = window.inner_size();
         let config = surface.get_default_config(&adapter, inner.width.max(1), inner.height.max(1));
         let mut config = config.ok_or_else(|| no_adapter("the adapter does not present to the window"))?;
-        // The panel wants a format that does not convert; the renderer takes either.
+        // One that converts, so that what is seen through is mixed as light.
         let formats = surface.get_capabilities(&adapter).formats;
-        let plain = |format: &&TextureFormat| matches!(format, TextureFormat::Bgra8Unorm | TextureFormat::Rgba8Unorm);
-        config.format = formats.iter().find(plain).copied().unwrap_or(config.format);
+        let converts =
+            |format: &&TextureFormat| matches!(format, TextureFormat::Bgra8UnormSrgb | TextureFormat::Rgba8UnormSrgb);
+        config.format = formats.iter().find(converts).copied().unwrap_or(config.format);
         config.present_mode = wgpu::PresentMode::AutoVsync;
         surface.configure(&device, &config);
         Ok(Self { window, surface, config, info: adapter.get_info(), device, queue, failure })

@@ -4,8 +4,8 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use x11rb::connection::{Connection, RequestConnection};
 use x11rb::protocol::xproto::{
-    BUTTON_PRESS_EVENT, BUTTON_RELEASE_EVENT, ClientMessageEvent, ConnectionExt, EventMask, ImageFormat,
-    KEY_PRESS_EVENT, KEY_RELEASE_EVENT, MOTION_NOTIFY_EVENT,
+    BUTTON_PRESS_EVENT, BUTTON_RELEASE_EVENT, ClientMessageEvent, ConnectionExt, EventMask, ImageFormat, InputFocus,
+    KEY_PRESS_EVENT, KEY_RELEASE_EVENT, MOTION_NOTIFY_EVENT, MapState,
 };
 use x11rb::protocol::xtest::ConnectionExt as _;
 use x11rb::rust_connection::RustConnection;
@@ -91,12 +91,29 @@ impl Screen {
         first + codes.position(|keysyms| keysyms[0] == keysym).expect("a key of the keyboard") as u8
     }
 
+    /// Gives keys to the one window, as a window manager does.
+    pub(crate) fn focus(&self) {
+        for window in self.windows() {
+            self.connection.set_input_focus(InputFocus::POINTER_ROOT, window, x11rb::CURRENT_TIME).unwrap();
+        }
+        self.connection.sync().unwrap();
+    }
+
+    /// The windows that are shown.
+    fn windows(&self) -> Vec<u32> {
+        let children = self.connection.query_tree(self.root).unwrap().reply().unwrap().children;
+        let is_shown = |window: &u32| {
+            let attributes = self.connection.get_window_attributes(*window).unwrap();
+            attributes.reply().is_ok_and(|attributes| attributes.map_state == MapState::VIEWABLE)
+        };
+        children.into_iter().filter(is_shown).collect()
+    }
+
     /// Asks the one window to close, as a window manager does.
     pub(crate) fn close_window(&self) {
-        let children = self.connection.query_tree(self.root).unwrap().reply().unwrap().children;
         let atom = |name: &str| self.connection.intern_atom(false, name.as_bytes()).unwrap().reply().unwrap().atom;
         let (protocols, delete) = (atom("WM_PROTOCOLS"), atom("WM_DELETE_WINDOW"));
-        for window in children {
+        for window in self.windows() {
             let message = ClientMessageEvent::new(32, window, protocols, [delete, 0, 0, 0, 0]);
             self.connection.send_event(false, window, EventMask::NO_EVENT, message).unwrap();
         }
