@@ -283,7 +283,7 @@ fn a_body_follows_the_cursor() {
         screen.press(LEFT);
         assert_eq!(viewer.event("grabbed")["body"], top.slot());
         // Aside, clear of the boxes below.
-        let to = at + Vec2::new(220.0, -40.0);
+        let to = at + Vec2::new(330.0, -40.0);
         screen.point(to.x, to.y);
         let pulled = viewer.frame("frame", |_| true);
         viewer.frame("a second more", |frame| frame.step >= pulled.step + 60);
