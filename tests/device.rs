@@ -158,9 +158,11 @@ fn stages_are_timed_where_the_device_has_timestamps() {
         scan.record(&mut recorder, &data, None).unwrap();
     }
     recorder.submit().unwrap();
-    let times = timer.take(gpu(), true).unwrap().unwrap();
-    assert_eq!(times.iter().map(|time| time.stage).collect::<Vec<_>>(), ["first", "second"]);
-    assert!(times.iter().all(|time| time.milliseconds.is_some_and(|ms| ms > 0.0 && ms < 10_000.0)), "{times:?}");
+    let runs = timer.take(gpu(), true).unwrap().unwrap();
+    assert_eq!(runs.iter().map(|run| run.stage).collect::<Vec<_>>(), ["first", "second", "first"]);
+    assert!(runs.iter().all(|run| run.milliseconds > 0.0 && run.milliseconds < 10_000.0), "{runs:?}");
+    assert_eq!(runs[0].begin, 0.0);
+    assert!(runs.windows(2).all(|two| two[0].begin + two[0].milliseconds <= two[1].begin + 1e-6), "{runs:?}");
     assert!(timer.take(gpu(), false).unwrap().is_none());
 }
 

@@ -1,10 +1,12 @@
 //! The program `examples/run`: what it prints and writes, how it refuses, and what README.md says of it. Oracles: its
 //! documented fields, and the library run on the same scene.
 
+#[path = "common/program.rs"]
+mod program;
+
+use program::program;
 use serde_json::Value;
-use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::OnceLock;
 use tumble::core::{measures, scenes};
 use tumble::{Backend, Broadphase, Params, World};
 
@@ -31,29 +33,6 @@ const FIELDS: [&str; 21] = [
     "quarantined",
     "state_hash",
 ];
-
-/// The program. Plain `cargo test` has built it beside the tests; one test alone would find an old one there, so cargo
-/// looks again.
-fn program() -> &'static Path {
-    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| {
-        let test = std::env::current_exe().unwrap();
-        let profile = test.ancestors().nth(2).unwrap();
-        if let Some(cargo) = std::env::var_os("CARGO") {
-            let release = if cfg!(debug_assertions) { None } else { Some("--release") };
-            let build = Command::new(cargo)
-                .args(["build", "--quiet", "--example", "run"])
-                .args(release)
-                .env("CARGO_TARGET_DIR", profile.parent().unwrap())
-                .current_dir(env!("CARGO_MANIFEST_DIR"))
-                .status();
-            assert!(build.unwrap().success(), "the example builds");
-        }
-        let path = profile.join("examples").join(format!("run{}", std::env::consts::EXE_SUFFIX));
-        assert!(path.exists(), "{} is missing: cargo build --release --example run", path.display());
-        path
-    })
-}
 
 fn run(arguments: &[&str]) -> Output {
     Command::new(program()).args(arguments).output().unwrap()

@@ -73,6 +73,10 @@ pub(crate) struct Args {
     /// Write the same as the table to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
+    /// Write a trace of the last 10,000 steps to this file, for https://ui.perfetto.dev or chrome://tracing; times each
+    /// pass as `--profile` does
+    #[arg(long, value_name = "FILE")]
+    pub(crate) trace: Option<PathBuf>,
     /// Name the scenes and end
     #[arg(long)]
     pub(crate) list: bool,
@@ -98,7 +102,7 @@ enum BroadphaseName {
 impl Args {
     /// Refused if no step can run with them.
     pub(crate) fn params(&self) -> Result<Params, Failure> {
-        let mut params = Params { profile: self.profile, ..Params::default() };
+        let mut params = Params { profile: self.profile || self.trace.is_some(), ..Params::default() };
         params.dt = self.dt.unwrap_or(params.dt);
         params.substeps = self.substeps.unwrap_or(params.substeps);
         params.threads = self.threads.map(|n| n as usize);

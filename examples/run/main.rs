@@ -5,6 +5,7 @@
 
 mod args;
 mod outcome;
+mod trace;
 
 use args::{Args, Failure};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -14,6 +15,7 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
+use trace::Trace;
 use tumble::core::{measures, scenes};
 use tumble::{Backend, World};
 
@@ -56,13 +58,15 @@ fn run(args: &Args) -> Result<(), Failure> {
     let (standard, bodies) = args.scene()?;
     // Before the run, so that a bad path costs no time.
     let mut json = args.json.as_deref().map(open).transpose()?;
+    let mut trace_file = args.trace.as_deref().map(open).transpose()?;
     let mut world = World::new((standard.build)(bodies), params, args.backend())?;
     #[cfg(feature = "cpu")]
     if matches!((args.backend(), &world), (Backend::Auto, World::Cpu(_))) {
         tell("no GPU can be used (software adapters do not count here): running on the CPU");
     }
     let mut outcome = Outcome::new(standard.name, args.steps, &params, world.scene());
-    take_steps(&mut world, &mut outcome)?;
+    let mut trace = args.trace.is_some().then(|| Trace::new(standard.name));
+    take_steps(&mut world, &mut outcome, trace.as_mut())?;
 
     let spinner = ProgressBar::new_spinner().with_message("measuring the overlap");
     spinner.enable_steady_tick(Duration::from_millis(100));
@@ -73,20 +77,27 @@ fn run(args: &Args) -> Result<(), Failure> {
     spinner.finish_and_clear();
 
     // The table last and in any case: a full disk does not take the result of a long run away.
-    let written = json.as_mut().map_or(Ok(()), |(file, path)| write(file, path, &outcome));
+    let traced =
+        trace_file.as_mut().zip(trace).map_or(Ok(()), |((file, path), trace)| write(file, path, &trace.json()));
+    let written = json.as_mut().map_or(Ok(()), |(file, path)| write(file, path, &format!("{:#}\n", outcome.json())));
     print(&outcome.table())?;
-    written
+    written.and(traced)
 }
 
 /// Runs the steps and notes what each took.
-fn take_steps(world: &mut World, outcome: &mut Outcome) -> Result<(), Failure> {
+fn take_steps(world: &mut World, outcome: &mut Outcome, mut trace: Option<&mut Trace>) -> Result<(), Failure> {
     let bar = progress_bar(outcome.steps)?;
     for number in 1..=outcome.steps {
         let begin = Instant::now();
         let report = world.step().and_then(|()| world.sync());
         let milliseconds = begin.elapsed().as_secs_f64() * 1e3;
         match report {
-            Ok(report) => outcome.add(milliseconds, report),
+            Ok(report) => {
+                if let Some(trace) = &mut trace {
+                    trace.add(begin, milliseconds, &report);
+                }
+                outcome.add(milliseconds, report);
+            }
             Err(error) => {
                 bar.finish_and_clear();
                 return Err(Failure::Run(format!("step {number}: {error}")));
@@ -113,8 +124,7 @@ fn open(path: &Path) -> Result<(File, &Path), Failure> {
     }
 }
 
-fn write(file: &mut File, path: &Path, outcome: &Outcome) -> Result<(), Failure> {
-    let text = format!("{:#}\n", outcome.json());
+fn write(file: &mut File, path: &Path, text: &str) -> Result<(), Failure> {
     let mut replace = || {
         // What is no regular file, such as a pipe, has no length to cut.
         if file.metadata()?.is_file() {

@@ -23,6 +23,8 @@ mod report;
 mod scene;
 pub mod scenes;
 mod shape;
+#[doc(hidden)]
+pub mod stopwatch;
 pub mod validate;
 pub mod wear;
 
@@ -38,7 +40,7 @@ pub use params::{Broadphase, Capacities, MortonBits, Params, Traversal};
 pub use plan::Plan;
 pub use poses::{Pose, Poses, Velocities, Velocity};
 pub use query::{Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Ray, RayHit};
-pub use report::{Penetration, StageTime, StepReport};
+pub use report::{Penetration, StageRun, StageTime, StepReport};
 pub use scene::Scene;
 pub use shape::Shape;
 

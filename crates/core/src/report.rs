@@ -13,6 +13,31 @@ pub struct StageTime {
     pub milliseconds: Option<f64>,
 }
 
+/// One run of a stage in one step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StageRun {
+    /// The stage's name, or that of something else that the host did; see [`StepReport::host_runs`].
+    pub stage: &'static str,
+    /// When it began, ms; from when on, the list that it is in says.
+    pub begin: f64,
+    /// How long it took, ms.
+    pub milliseconds: f64,
+}
+
+impl StageTime {
+    /// Time of each stage, in the order of their first runs.
+    pub fn sums(runs: &[StageRun]) -> Vec<Self> {
+        let mut times: Vec<Self> = Vec::new();
+        for run in runs {
+            match times.iter_mut().find(|time| time.stage == run.stage) {
+                Some(time) => time.milliseconds = time.milliseconds.map(|sum| sum + run.milliseconds),
+                None => times.push(Self { stage: run.stage, milliseconds: Some(run.milliseconds) }),
+            }
+        }
+        times
+    }
+}
+
 /// Overlap of all touching pairs; see [`measures`](crate::measures).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Penetration {
@@ -63,6 +88,14 @@ pub struct StepReport {
     pub broadphase_turns: u32,
     /// Milliseconds a stage, when profiling.
     pub stages: Vec<StageTime>,
+    /// What the host did since the last call of `step` began, in ms from there, in the order of the beginnings; when
+    /// profiling. On the CPU side its stages, and `growth` of buffers between two attempts. On a GPU `growth`,
+    /// `pipelines` (their making), `upload`, `record` and `submit` of the commands, `wait` for earlier steps or all of them,
+    /// and `readback` of results. Those that begin within another lie within it.
+    pub host_runs: Vec<StageRun>,
+    /// The stages of the last submission that was timed, by the device's clock: ms since the first of them began; when
+    /// profiling on a GPU that has timestamps. That clock has no known relation to the host's.
+    pub device_runs: Vec<StageRun>,
 }
 
 impl StepReport {

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use tumble_core::{Result, StageTime};
+use tumble_core::{Result, StageRun};
 use wgpu::{BufferUsages, CommandEncoder, QuerySet, SubmissionIndex};
 
 use crate::device::Gpu;
@@ -80,12 +80,12 @@ impl Timer {
         self.readback.submitted(index);
     }
 
-    /// Times of the oldest submission that was timed and not yet taken, a stage each in the order of their first
-    /// appearance; `None` when it has not arrived and `wait` is false, or when there is none.
+    /// Runs of the stages of the oldest submission that was timed and not yet taken, in ms since the first of them began;
+    /// `None` when it has not arrived and `wait` is false, or when there is none.
     ///
     /// # Errors
     /// As for [`Readback::try_take`] and [`Readback::wait_take`].
-    pub fn take(&mut self, gpu: &Gpu, wait: bool) -> Result<Option<Vec<StageTime>>> {
+    pub fn take(&mut self, gpu: &Gpu, wait: bool) -> Result<Option<Vec<StageRun>>> {
         let bytes = if wait { self.readback.wait_take(gpu) } else { self.readback.try_take(gpu) };
         let bytes = match bytes {
             Ok(Some(bytes)) => bytes,
@@ -96,31 +96,35 @@ impl Timer {
             }
         };
         let stages = self.flying.pop_front().unwrap_or_default();
-        Ok(Some(add_up(&stages, &bytemuck::pod_collect_to_vec(&bytes), self.nanoseconds_per_tick)))
+        Ok(Some(runs(&stages, &bytemuck::pod_collect_to_vec(&bytes), self.nanoseconds_per_tick)))
     }
 }
 
-/// Time of each stage, in the order of their first appearance, from two timestamps for each time that it ran.
-fn add_up(stages: &[&'static str], ticks: &[u64], nanoseconds_per_tick: f64) -> Vec<StageTime> {
-    let mut times: Vec<StageTime> = Vec::new();
-    for (stage, span) in stages.iter().zip(ticks.chunks_exact(2)) {
-        let spent = span[1].saturating_sub(span[0]) as f64 * nanoseconds_per_tick * 1e-6;
-        match times.iter_mut().find(|time| time.stage == *stage) {
-            Some(time) => time.milliseconds = time.milliseconds.map(|sum| sum + spent),
-            None => times.push(StageTime { stage, milliseconds: Some(spent) }),
-        }
-    }
-    times
+/// A run from the two timestamps around each.
+fn runs(stages: &[&'static str], ticks: &[u64], nanoseconds_per_tick: f64) -> Vec<StageRun> {
+    let first = ticks.first().copied().unwrap_or_default();
+    // A driver that sets its clock back does not make times negative.
+    let milliseconds = |ticks: u64, since: u64| ticks.saturating_sub(since) as f64 * nanoseconds_per_tick * 1e-6;
+    let run = |(stage, span): (&&'static str, &[u64])| StageRun {
+        stage,
+        begin: milliseconds(span[0], first),
+        milliseconds: milliseconds(span[1], span[0]),
+    };
+    stages.iter().zip(ticks.chunks_exact(2)).map(run).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tumble_core::StageTime;
 
     #[test]
-    fn times_of_a_stage_add_up() {
-        let times = add_up(&["a", "b", "a"], &[1_000_000, 2_000_000, 2_000_000, 5_000_000, 5_000_000, 9_000_000], 0.5);
+    fn runs_in_their_order_and_their_sums() {
+        let ticks = [1_000_000, 2_000_000, 2_000_000, 5_000_000, 5_000_000, 9_000_000];
+        let runs = runs(&["a", "b", "a"], &ticks, 0.5);
+        let expected = [("a", 0.0, 0.5), ("b", 0.5, 1.5), ("a", 2.0, 2.0)];
+        assert_eq!(runs, expected.map(|(stage, begin, milliseconds)| StageRun { stage, begin, milliseconds }));
         let expected = [("a", 2.5), ("b", 1.5)].map(|(stage, ms)| StageTime { stage, milliseconds: Some(ms) });
-        assert_eq!(times, expected);
+        assert_eq!(StageTime::sums(&runs), expected);
     }
 }

@@ -1,6 +1,5 @@
 //! What a world keeps, and a step of it: the plan phase, which writes nothing that lasts, and the commit.
 
-use super::Stopwatch;
 use crate::batch::{self, Batches};
 use crate::broadphase::{self, Boxes, Finder, Search, TooMany};
 use crate::contact::{self, Matched};
@@ -14,6 +13,7 @@ use tumble_core::layout::{
     Aabb, BodyProps, BodyState, Collider, Control, FoundManifold, Impulse, Manifold, Pair, PoseRecord,
     QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, body_flags,
 };
+use tumble_core::stopwatch::Stopwatch;
 use tumble_core::{Broadphase, Error, Params, Result, limits};
 
 /// What lives past a step; written only when a step commits (properties and colliders by edits, absolutely).
@@ -99,17 +99,18 @@ impl Kept {
         step: &StepParams,
         watch: &mut Stopwatch,
     ) -> std::result::Result<Planned, Overflow> {
+        let run = watch.begin("edit");
         let mut control = Control { step: step.step, recolor: self.control.recolor, ..Control::zeroed() };
         let states = self.edit(asked.edits, step);
         let states = self.quarantine(states, &mut control);
-        watch.lap("edit");
+        let run = watch.next(run, "bounds");
         let aabbs: Vec<Aabb> =
             self.colliders.par_iter().with_min_len(256).map(|c| self.bounds(c, &states, step)).collect();
-        watch.lap("bounds");
+        let run = watch.next(run, "broadphase");
         let Asked { edits, params, broadphase } = *asked;
         let boxes = Boxes::new(&aabbs);
         let found = finder.find(&boxes, &Search { step, params, broadphase, stale: edits.stale });
-        watch.lap("broadphase");
+        let run = watch.next(run, "contact");
         control.pair_count = found.count.min(u32::MAX.into()) as u32;
         control.turns = found.turns;
         let over = |buffer, needed: u32, capacity: u32| Err(Overflow { buffer, needed: needed.into(), capacity });
@@ -127,7 +128,7 @@ impl Kept {
         let matched = contact::match_pairs(&self.pairs, &found.pairs, &self.colliders, &self.free, step.step);
         control.new_count = matched.new_count;
         control.dead_count = matched.dead_slots.len() as u32;
-        watch.lap("contact");
+        let run = watch.next(run, "narrowphase");
         let manifolds: Vec<Manifold> = matched
             .pairs
             .par_iter()
@@ -141,7 +142,7 @@ impl Kept {
         control.processed = control.pair_count - u32::from(step.drop_pair < control.pair_count);
         control.constraint_count = manifolds.iter().map(|m| u32::from(m.count > 0)).sum();
         control.point_count = manifolds.iter().map(|m| m.count).sum();
-        watch.lap("narrowphase");
+        let run = watch.next(run, "batch");
         let body_of = |collider: u32| self.colliders[collider as usize].body;
         let ends: Vec<_> = matched.pairs.iter().map(|p| batch::ends(p, &body_of, &states)).collect();
         let recolor = self.control.recolor != 0;
@@ -153,7 +154,7 @@ impl Kept {
         control.batch_start[..batches.start.len()].copy_from_slice(&batches.start);
         control.last_count = batches.order.len() as u32 - batches.start[batches.start.len() - 2];
         control.solved = batches.order.len() as u32;
-        watch.lap("batch");
+        watch.end(run);
         if control.last_count > step.last_limit {
             return over("last batch", control.last_count, step.last_limit);
         }
@@ -190,6 +191,7 @@ impl Kept {
 
     /// Solves and writes everything that lives past the step.
     pub(super) fn commit(&mut self, planned: Planned, step: &StepParams, restitution: bool, watch: &mut Stopwatch) {
+        let run = watch.begin("prepare");
         let Planned { states, matched, manifolds, batches, mut control } = planned;
         let mut bodies: Vec<SolverBody> = (0..states.len())
             .into_par_iter()
@@ -202,10 +204,10 @@ impl Kept {
             let stored = &self.impulses[4 * pair.slot as usize..][..4];
             prepare::Contact { pair, manifold: &manifolds[index], stored }
         });
-        watch.lap("prepare");
+        let run = watch.next(run, "solver");
         let moving = solver::Bodies { solver: &mut bodies, states: &states, props: &self.props };
         solver::solve(&mut self.rows, moving, step, restitution);
-        watch.lap("solver");
+        let run = watch.next(run, "motion");
         contact::commit_free(&mut self.free, &matched);
         self.commit_slots(&states, &matched, &manifolds, &batches);
         let committed: Vec<_> =
@@ -227,7 +229,7 @@ impl Kept {
         control.old_pair_count = self.pairs.len() as u32;
         control.free_count = self.free.len() as u32;
         self.control = control;
-        watch.lap("motion");
+        watch.end(run);
     }
 
     /// What the slots remember: how the contact was found, its batch, its impulses.

@@ -10,10 +10,10 @@ use crate::solver::Rows;
 use bytemuck::Zeroable;
 use glam::Vec3;
 use kept::{Asked, Kept, Overflow};
-use std::time::Instant;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{Control, PoseRecord, StepParams};
 use tumble_core::limits::{self, Room};
+use tumble_core::stopwatch::{Span, Stopwatch};
 use tumble_core::{Broadphase, Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
 
 /// A simulation on the CPU.
@@ -31,30 +31,11 @@ pub struct World {
     /// How far colliders lay apart in the step of this number.
     extent: Option<(u32, Vec3)>,
     queries: query::Cached,
+    watch: Stopwatch,
     /// What the last committed step was told.
     last_step: StepParams,
     /// Why the last step did not run.
     failed: Option<Error>,
-}
-
-/// Milliseconds by stage, when asked for.
-struct Stopwatch {
-    last: Option<Instant>,
-    stages: Vec<StageTime>,
-}
-
-impl Stopwatch {
-    fn new(on: bool) -> Self {
-        Self { last: on.then(Instant::now), stages: Vec::new() }
-    }
-    fn lap(&mut self, stage: &'static str) {
-        if let Some(last) = &mut self.last {
-            let now = Instant::now();
-            let milliseconds = Some((now - *last).as_secs_f64() * 1e3);
-            self.stages.push(StageTime { stage, milliseconds });
-            *last = now;
-        }
-    }
 }
 
 impl World {
@@ -98,6 +79,7 @@ impl World {
             finder: Finder::default(),
             extent: None,
             queries: query::Cached::default(),
+            watch: Stopwatch::default(),
             last_step: StepParams::zeroed(),
             failed: None,
         })
@@ -143,6 +125,8 @@ impl World {
     /// [`Error::Capacity`] when it needs more room than it may have: the step did not run, its edits wait for the next
     /// call, and the last good state stays readable.
     pub fn step(&mut self) -> Result<()> {
+        let span = Span::enter("step");
+        self.watch.start(self.params.profile);
         let needed = Room {
             bodies: self.editor.body_slots() as u32,
             colliders: self.editor.collider_slots() as u32,
@@ -164,7 +148,7 @@ impl World {
         step.cell_table_bits = limits::cell_table_bits(step.collider_count);
         step.large_limit = limits::large_limit(step.collider_count, self.editor.spread().is_wide());
         step.drop_pair = self.drop_pair;
-        self.failed = self.run(&edits, step).err();
+        self.failed = self.run(&edits, step, &span).err();
         if let Some(error) = self.failed.clone() {
             self.editor.put_back(edits);
             return Err(error);
@@ -197,23 +181,32 @@ impl World {
     }
 
     /// Plans and commits a step, growing the pair list between where that is needed and allowed.
-    fn run(&mut self, edits: &EditBatch, mut step: StepParams) -> Result<()> {
+    fn run(&mut self, edits: &EditBatch, mut step: StepParams, span: &Span) -> Result<()> {
         let restitution = self.editor.plan().restitution;
         let broadphase = self.params.broadphase.resolve(self.editor.spread());
         loop {
-            let mut watch = Stopwatch::new(self.params.profile);
+            let attempt = self.watch.runs().len();
             step.pair_capacity = (self.kept.impulses.len() / 4) as u32;
-            let (kept, pool, finder) = (&mut self.kept, &self.pool, &mut self.finder);
+            let (kept, pool, finder, watch) = (&mut self.kept, &self.pool, &mut self.finder, &mut self.watch);
             let asked = Asked { edits, params: &self.params, broadphase };
-            let planned = pool.install(|| kept.plan(&asked, finder, &step, &mut watch));
-            match planned {
-                Ok(planned) => {
-                    pool.install(|| kept.commit(planned, &step, restitution, &mut watch));
+            // One visit to the pool: each costs two changes of thread, which a busy machine makes dear.
+            let done = pool.install(|| {
+                let _span = span.enter_again();
+                let planned = kept.plan(&asked, finder, &step, watch)?;
+                kept.commit(planned, &step, restitution, watch);
+                Ok(())
+            });
+            match done {
+                Ok(()) => {
                     self.last_step = step;
-                    self.finish(watch, broadphase);
+                    self.finish(attempt, broadphase);
                     return Ok(());
                 }
-                Err(overflow) => self.grow(overflow)?,
+                Err(overflow) => {
+                    let growth = self.watch.begin("growth");
+                    self.grow(overflow)?;
+                    self.watch.end(growth);
+                }
             }
         }
     }
@@ -236,7 +229,8 @@ impl World {
         }
     }
 
-    fn finish(&mut self, watch: Stopwatch, broadphase: Broadphase) {
+    /// `attempt`: where the runs of the one that went through begin.
+    fn finish(&mut self, attempt: usize, broadphase: Broadphase) {
         let mut report = StepReport::from_control(&self.kept.control);
         report.backend = "cpu";
         report.adapter = self.adapter.clone();
@@ -245,7 +239,8 @@ impl World {
         report.broadphase = broadphase;
         report.broadphase_bytes = self.finder.bytes();
         report.memory_bytes = self.kept.bytes() + self.finder.bytes() + self.queries.bytes();
-        report.stages = watch.stages;
+        report.stages = StageTime::sums(&self.watch.runs()[attempt..]);
+        report.host_runs = self.watch.runs().to_vec();
         self.report = report;
     }
 }

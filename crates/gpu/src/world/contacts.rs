@@ -20,6 +20,7 @@ impl World {
         // Slots come from a stack with the lowest on top, so as many were ever taken as there were pairs at most.
         let slots = if pairs == 0 { 0 } else { u64::from(self.most_pairs) };
         let part = |name: &str, count: u64, bytes: usize| Ok((self.buffers.buffer(name)?, 0, count * bytes as u64));
+        let run = self.watch.begin("readback");
         let bytes = read_parts(
             &self.gpu,
             [
@@ -31,6 +32,7 @@ impl World {
                 part("slot_impulses", slots, 4 * size_of::<Impulse>())?,
             ],
         )?;
+        self.watch.end(run);
         let [states, colliders, pairs, batch_of_slot, found, impulses] = &bytes;
         let committed = Committed {
             step: &self.last_step,

@@ -25,7 +25,9 @@ impl World {
         if self.waiting.is_empty() {
             return Ok(());
         }
+        let run = self.watch.begin("growth");
         self.grow_pairs()?;
+        self.watch.end(run);
         while let Some(record) = self.waiting.pop_front() {
             self.submit(record)?;
         }
@@ -70,6 +72,10 @@ impl World {
         let Sizes { bodies, colliders, .. } = self.sizes;
         let room = Room { bodies, colliders, edits: self.edit_room };
         let (room, grown) = room.grown(&needed, &within(&self.gpu, &self.params))?;
+        if grown.is_empty() {
+            return Ok(());
+        }
+        let run = self.watch.begin("growth");
         if room.edits > self.edit_room {
             for buffer in ["edit_records", "edit_ranges"] {
                 self.buffers.grow(&self.gpu, buffer, room.edits.into(), false)?;
@@ -79,6 +85,7 @@ impl World {
         if (room.bodies, room.colliders) != (bodies, colliders) {
             self.grow_scene(Sizes { bodies: room.bodies, colliders: room.colliders, ..self.sizes })?;
         }
+        self.watch.end(run);
         grown.into_iter().for_each(|buffer| self.count_growth(buffer));
         Ok(())
     }

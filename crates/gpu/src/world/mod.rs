@@ -17,7 +17,8 @@ use std::collections::VecDeque;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{BodyState, Control, LAST_BATCH, Pair, PoseRecord, StepParams};
 use tumble_core::limits::{self, Room};
-use tumble_core::{Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
+use tumble_core::stopwatch::{Span, Stopwatch};
+use tumble_core::{Editor, Error, Params, Poses, Result, Scene, StageRun, StageTime, StepReport, Velocities};
 
 /// Steps in flight before `step` waits.
 const IN_FLIGHT: usize = 3;
@@ -62,7 +63,8 @@ pub struct World {
     batches: VecDeque<(u32, u32)>,
     /// How far colliders lay apart in the step of this number.
     extent: Option<(u32, Vec3)>,
-    stage_times: Vec<StageTime>,
+    device_runs: Vec<StageRun>,
+    watch: Stopwatch,
     growths: Vec<(&'static str, u32)>,
     drop_pair: u32,
     /// From the first query on.
@@ -117,7 +119,10 @@ impl World {
             packed.states.iter().zip(&packed.props).map(|(s, p)| PoseRecord::of(s, p)).collect();
         gpu.queue.write_buffer(buffers.buffer("poses")?, 0, bytemuck::cast_slice(&poses));
         let built = Built { plan: packed.plan, choice: Choice::new(&params, &editor) };
-        let stages = Stages::new(&gpu, &mut pipelines, &sizes, &built)?;
+        let stages = {
+            let _span = Span::enter("pipelines");
+            Stages::new(&gpu, &mut pipelines, &sizes, &built)?
+        };
         let timer = if params.profile { Timer::new(&gpu)? } else { None };
         let control_bytes = size_of::<Control>() as u64;
         Ok(Self {
@@ -133,7 +138,8 @@ impl World {
             most_pairs: 0,
             batches: VecDeque::new(),
             extent: None,
-            stage_times: Vec::new(),
+            device_runs: Vec::new(),
+            watch: Stopwatch::default(),
             growths: Vec::new(),
             drop_pair: u32::MAX,
             built,
@@ -218,6 +224,8 @@ impl World {
     /// edits wait for the next call, and the last good state stays readable. [`Error::DeviceLost`],
     /// [`Error::OutOfMemory`] and [`Error::Gpu`] from the device.
     pub fn step(&mut self) -> Result<()> {
+        let _span = Span::enter("step");
+        self.watch.start(self.params.profile);
         self.run_waiting()?;
         self.take_statuses(IN_FLIGHT - 1)?;
         let (bodies, colliders) = (self.editor.body_slots() as u32, self.editor.collider_slots() as u32);
@@ -254,7 +262,9 @@ impl World {
     /// As for [`World::step`]; once that was told, the last good poses.
     pub fn poses(&mut self) -> Result<Poses> {
         self.take_statuses(0)?;
+        let run = self.watch.begin("readback");
         let bytes = read_now(&self.gpu, self.buffers.buffer("poses")?, 0, pose_bytes(&self.sizes))?;
+        self.watch.end(run);
         Ok(self.poses_of(self.last.step, &bytes))
     }
 
@@ -296,7 +306,9 @@ impl World {
     pub fn velocities(&mut self) -> Result<Velocities> {
         self.take_statuses(0)?;
         let bytes = u64::from(self.sizes.bodies) * size_of::<BodyState>() as u64;
+        let run = self.watch.begin("readback");
         let bytes = read_now(&self.gpu, self.buffers.buffer("states")?, 0, bytes)?;
+        self.watch.end(run);
         Ok(Velocities::from_states(self.last.step.into(), &bytemuck::pod_collect_to_vec::<u8, BodyState>(&bytes)))
     }
 
@@ -314,7 +326,9 @@ impl World {
         report.broadphase_bytes = self.stages.broadphase.bytes();
         report.memory_bytes = self.buffers.bytes() + self.stages.bytes();
         report.memory_bytes += self.query.as_ref().map_or(0, Query::bytes);
-        report.stages = self.stage_times.clone();
+        report.stages = StageTime::sums(&self.device_runs);
+        report.host_runs = self.watch.runs().to_vec();
+        report.device_runs = self.device_runs.clone();
         report
     }
 
@@ -324,7 +338,9 @@ impl World {
         let widened = wanted.plan.widen(&record.wants.plan);
         if widened || wanted.choice != record.wants.choice {
             wanted.choice = record.wants.choice;
+            let run = self.watch.begin("pipelines");
             self.stages = Stages::new(&self.gpu, &mut self.pipelines, &self.sizes, &wanted)?;
+            self.watch.end(run);
             self.built = wanted;
         }
         let step = &mut record.step;
@@ -333,13 +349,17 @@ impl World {
         // dispatch a batch is in: the bits are the same.)
         let known = self.batches.iter().find(|(number, _)| number + IN_FLIGHT as u32 == step.step);
         step.wide_batches = known.map_or(WIDE_BATCHES, |(_, count)| *count);
+        let run = self.watch.begin("upload");
         self.upload(&record)?;
         self.stages.prepare(&self.gpu, &record.step, record.edits.stale)?;
+        let run = self.watch.next(run, "record");
         let timer = if self.params.profile { self.timer.as_mut() } else { None };
         let mut recorder = Recorder::new(&self.gpu, &self.buffers, &mut self.cache, timer);
         self.stages.record(&mut recorder, &self.buffers, &record.step)?;
         self.statuses.copy(recorder.encoder(), self.buffers.buffer("control")?, 0);
+        let run = self.watch.next(run, "submit");
         let index = recorder.submit()?;
+        self.watch.end(run);
         self.statuses.submitted(&index);
         self.flying.push_back(record);
         Ok(())
@@ -358,7 +378,10 @@ impl World {
     fn take_statuses(&mut self, most: usize) -> Result<()> {
         while !self.flying.is_empty() {
             let taken = if self.flying.len() > most {
-                self.statuses.wait_take(&self.gpu)?
+                let run = self.watch.begin("wait");
+                let taken = self.statuses.wait_take(&self.gpu)?;
+                self.watch.end(run);
+                taken
             } else {
                 self.statuses.try_take(&self.gpu)?
             };
@@ -383,9 +406,11 @@ impl World {
             self.last = status;
         }
         if let Some(timer) = &mut self.timer {
-            while let Some(times) = timer.take(&self.gpu, most == 0)? {
-                self.stage_times = times;
+            let run = self.watch.begin("readback");
+            while let Some(runs) = timer.take(&self.gpu, most == 0)? {
+                self.device_runs = runs;
             }
+            self.watch.end(run);
         }
         self.gpu.check()
     }
