@@ -54,7 +54,7 @@ impl Overlay {
         }
         if let Some((grab, target)) = held {
             let from = grab.point(&mut simulation.world)?;
-            let radius = 0.12 * simulation.size;
+            let radius = 0.06 * simulation.size;
             self.lines.push(Line { from, to: target, color: HELD });
             self.markers.extend([from, target].map(|position| Marker { position, color: HELD, radius }));
         }

@@ -12,7 +12,7 @@ const PANEL: Color32 = Color32::from_rgb(19, 22, 27);
 const VALUE: Color32 = Color32::from_rgb(236, 239, 243);
 const BAD: Color32 = Color32::from_rgb(255, 92, 88);
 const SLOW: Color32 = Color32::from_rgb(250, 190, 80);
-const WIDTH: f32 = 232.0;
+const WIDTH: f32 = 244.0;
 
 /// What the panel tells.
 pub(crate) struct Facts<'a> {

@@ -15,6 +15,7 @@ use x11rb::wrapper::ConnectionExt as _;
 pub(crate) const LEFT: u8 = 1;
 pub(crate) const RIGHT: u8 = 3;
 pub(crate) const WHEEL_UP: u8 = 4;
+pub(crate) const WHEEL_DOWN: u8 = 5;
 
 /// A screen in memory; the server ends with it.
 pub(crate) struct Screen {
