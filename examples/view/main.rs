@@ -39,8 +39,11 @@ fn main() -> ExitCode {
 fn show(args: Args) -> Result<(), Failure> {
     args.params()?;
     let event_loop = EventLoop::new().map_err(|error| {
+        // Without the place in winit's sources.
+        let told = error.to_string();
+        let reason = told.rsplit(": ").next().unwrap_or(&told).trim_end_matches('.');
         Failure::Run(format!(
-            "no display was found ({error}); set DISPLAY or WAYLAND_DISPLAY, or use the example `run`, which needs none"
+            "no display was found ({reason}); set DISPLAY or WAYLAND_DISPLAY, or use the example `run`, which needs none"
         ))
     })?;
     let mut app = App { args, viewer: None, ended: Ok(()) };

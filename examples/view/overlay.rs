@@ -14,7 +14,8 @@ const FULL_LOAD: f32 = 16.0;
 const RAMP: [[u8; 3]; 5] = [[58, 110, 165], [86, 160, 150], [222, 196, 98], [226, 128, 68], [190, 48, 48]];
 const UNTOUCHED: [u8; 4] = [214, 219, 224, 255];
 const DOT: [u8; 4] = [26, 30, 36, 255];
-const NORMAL: [u8; 4] = [245, 245, 240, 255];
+/// Thin, since those within a heap show through it.
+const NORMAL: [u8; 4] = [24, 28, 36, 140];
 const SEQUENTIAL: [u8; 4] = [255, 0, 200, 255];
 const HELD: [u8; 4] = [255, 210, 60, 255];
 

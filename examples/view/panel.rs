@@ -54,6 +54,7 @@ pub(crate) fn show(context: &Context, facts: &Facts) -> Answer {
         let window = Window::new("tumble").title_bar(false).resizable(false).movable(false).frame(frame);
         let shown = window.anchor(Align2::LEFT_TOP, [12.0, 12.0]).show(context, |ui| {
             ui.set_width(WIDTH);
+            ui.spacing_mut().item_spacing.y = 4.0;
             heading(ui, facts);
             statistics(ui, facts);
             ui.separator();
@@ -227,9 +228,12 @@ fn stages(ui: &mut Ui, facts: &Facts, actions: &mut Vec<Action>) {
     if stages.is_empty() {
         ui.small(if facts.report.step == 0 { "after the next step" } else { "n/a: this adapter has no clock" });
     }
-    Grid::new("stages").num_columns(2).spacing([14.0, 2.0]).min_col_width(92.0).show(ui, |ui| {
+    Grid::new("stages").num_columns(2).spacing([14.0, 0.0]).min_row_height(14.0).show(ui, |ui| {
         for (stage, milliseconds) in stages {
-            row(ui, stage, &milliseconds.map_or("n/a".to_owned(), |ms| format!("{ms:.3} ms")), VALUE);
+            let told = milliseconds.map_or("n/a".to_owned(), |ms| format!("{ms:.3} ms"));
+            ui.small(stage);
+            ui.label(RichText::new(told).color(VALUE).monospace().small());
+            ui.end_row();
         }
     });
 }
