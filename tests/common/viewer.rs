@@ -11,7 +11,7 @@ use tumble_core::glam::Vec3;
 use tumble_draw::OrbitCamera;
 
 /// No event or picture is waited for any longer. Only a test that fails takes so long.
-pub(crate) const LONGEST: Duration = Duration::from_secs(20);
+pub(crate) const LONGEST: Duration = Duration::from_secs(120);
 
 /// The program. Plain `cargo test` has built it beside the tests; one test alone would find an old one there, so cargo
 /// looks again.
