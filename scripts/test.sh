@@ -17,16 +17,18 @@ has_vulkan() {
     return 1
 }
 
-has_loader() {
-    PATH="$PATH:/sbin:/usr/sbin" ldconfig -p 2>/dev/null | grep -F libvulkan.so.1 >/dev/null
+has_library() {
+    PATH="$PATH:/sbin:/usr/sbin" ldconfig -p 2>/dev/null | grep -F "$1" >/dev/null
 }
 
 # What the tests need and the machine lacks, by Debian's names.
 missing=()
 # macOS has Metal, and no X server.
 if [ "$(uname -s)" = Linux ]; then
-    has_vulkan && has_loader || missing+=(mesa-vulkan-drivers libvulkan1)
-    command -v Xvfb >/dev/null || missing+=(xvfb)
+    has_vulkan && has_library libvulkan.so.1 || missing+=(mesa-vulkan-drivers libvulkan1)
+    # The window loads its libraries as it starts.
+    command -v Xvfb >/dev/null && has_library libxkbcommon-x11.so.0 ||
+        missing+=(xvfb libx11-xcb1 libxcursor1 libxi6 libxkbcommon0 libxkbcommon-x11-0)
 fi
 browser=
 for name in chromium-headless-shell chromium google-chrome chrome; do
