@@ -37,7 +37,7 @@ const FIELDS: [&str; 21] = [
 ];
 
 fn run(arguments: &[&str]) -> Output {
-    Command::new(program()).args(arguments).output().unwrap()
+    Command::new(program("run")).args(arguments).output().unwrap()
 }
 
 fn text(bytes: &[u8]) -> &str {
@@ -325,14 +325,15 @@ fn pictures_show_the_states_of_the_run() {
 fn a_full_disk_is_told_and_the_table_still_comes() {
     use std::fs::OpenOptions;
     let run = ["column", "--backend", "cpu", "--steps", "2"];
-    let output = Command::new(program()).args(run).args(["--json", "/dev/full"]).output().unwrap();
+    let output = Command::new(program("run")).args(run).args(["--json", "/dev/full"]).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     let line = error_line(&output);
     assert!(line.contains("cannot write /dev/full") && line.contains("No space left"), "{line}");
     assert!(text(&output.stdout).contains("state hash"));
 
     let full = || OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let output = Command::new(program()).args(run).args(["--png", "/dev/full", "--size", "64x36"]).output().unwrap();
+    let output =
+        Command::new(program("run")).args(run).args(["--png", "/dev/full", "--size", "64x36"]).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     assert!(error_line(&output).contains("cannot write /dev/full"));
     assert!(text(&output.stdout).contains("state hash"));
@@ -340,19 +341,19 @@ fn a_full_disk_is_told_and_the_table_still_comes() {
     let folder = tempfile::tempdir().unwrap();
     std::os::unix::fs::symlink("/dev/full", folder.path().join("frame_0001.png")).unwrap();
     let frames = ["--frames", folder.path().to_str().unwrap(), "--dt", "0.04", "--size", "64x36"];
-    let output = Command::new(program()).args(run).args(frames).output().unwrap();
+    let output = Command::new(program("run")).args(run).args(frames).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     let line = error_line(&output);
     assert!(line.contains("frame_0001.png") && line.contains("No space left"), "{line}");
     assert!(text(&output.stdout).contains("state hash"));
 
     for arguments in [run.as_slice(), &["--list"]] {
-        let output = Command::new(program()).args(arguments).stdout(full()).output().unwrap();
+        let output = Command::new(program("run")).args(arguments).stdout(full()).output().unwrap();
         assert_eq!(output.status.code(), Some(1));
         assert!(error_line(&output).contains("standard output"));
     }
     // Nowhere left to tell it.
-    let status = Command::new(program()).arg("nothing").stderr(full()).status().unwrap();
+    let status = Command::new(program("run")).arg("nothing").stderr(full()).status().unwrap();
     assert_eq!(status.code(), Some(2));
 }
 
@@ -360,7 +361,7 @@ fn a_full_disk_is_told_and_the_table_still_comes() {
 #[test]
 fn a_machine_without_an_adapter() {
     let run = |backend: &str, more: &[&str]| {
-        let mut command = Command::new(program());
+        let mut command = Command::new(program("run"));
         for variable in ["VK_ICD_FILENAMES", "VK_DRIVER_FILES"] {
             command.env(variable, "/nonexistent");
         }

@@ -217,7 +217,7 @@ fn the_program_writes_the_last_steps() {
     let file = folder.path().join("trace.json");
     std::fs::write(&file, "x".repeat(20_000_000)).unwrap();
     let arguments = ["column", "--bodies", "1", "--steps", "10020", "--threads", "1", "--backend", "cpu", "--trace"];
-    let output = Command::new(program()).args(arguments).arg(&file).output().unwrap();
+    let output = Command::new(program("run")).args(arguments).arg(&file).output().unwrap();
     assert!(output.status.success(), "{output:?}");
     let json: Value = serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
     check_nesting(&json);
@@ -228,7 +228,7 @@ fn the_program_writes_the_last_steps() {
     );
     assert_eq!(json["otherData"]["earlier steps left out"], 20);
     assert!(String::from_utf8_lossy(&output.stdout).contains("ms a pass"));
-    let help = Command::new(program()).arg("--help").output().unwrap();
+    let help = Command::new(program("run")).arg("--help").output().unwrap();
     assert!(String::from_utf8_lossy(&help.stdout).contains("last 10,000 steps"));
 }
 
@@ -238,7 +238,7 @@ fn a_file_that_cannot_be_written() {
     let folder = tempfile::tempdir().unwrap();
     let missing = folder.path().join("none").join("trace.json");
     let run = |path: &std::path::Path, steps: &str| {
-        Command::new(program())
+        Command::new(program("run"))
             .args(["column", "--backend", "cpu", "--steps", steps, "--trace"])
             .arg(path)
             .output()
@@ -251,7 +251,7 @@ fn a_file_that_cannot_be_written() {
     let file = folder.path().join("trace.json");
     std::fs::write(&file, "old").unwrap();
     let arguments = ["column", "--bodies", "0", "--trace"];
-    assert_eq!(Command::new(program()).args(arguments).arg(&file).status().unwrap().code(), Some(2));
+    assert_eq!(Command::new(program("run")).args(arguments).arg(&file).status().unwrap().code(), Some(2));
     assert_eq!(std::fs::read_to_string(&file).unwrap(), "old");
     if cfg!(target_os = "linux") {
         let output = run("/dev/full".as_ref(), "2");

@@ -3,18 +3,21 @@
 #![cfg(target_os = "linux")]
 
 mod common;
+#[path = "common/program.rs"]
+mod program;
 #[path = "common/viewer.rs"]
 mod viewer;
 #[path = "common/xvfb.rs"]
 mod xvfb;
 
+use program::program;
 use std::process::Command;
 use std::time::Instant;
 use tumble::core::glam::Vec2;
 use tumble::core::scenes;
 use tumble::prelude::*;
 use tumble_draw::{Offscreen, OrbitCamera, PoseUpload, Renderer, Style};
-use viewer::{LONGEST, Presented, Viewer, failing, program};
+use viewer::{LONGEST, Presented, Viewer, failing};
 use xvfb::{LEFT, RIGHT, Screen, WHEEL_DOWN, WHEEL_UP};
 
 const WIDTH: u32 = 800;
@@ -412,7 +415,7 @@ fn an_error_of_the_world_is_shown_and_survived() {
 #[test]
 fn what_is_missing_is_told_in_one_line() {
     let run = |display: Option<&str>| {
-        let mut command = Command::new(program());
+        let mut command = Command::new(program("view"));
         command.args(["column", "--frames", "1"]);
         for variable in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
             command.env_remove(variable);
@@ -450,7 +453,7 @@ fn bad_arguments_are_refused_in_one_line() {
     ];
     for (arguments, told) in cases {
         // Without a display: arguments come first.
-        let mut command = Command::new(program());
+        let mut command = Command::new(program("view"));
         command.args(arguments).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
         let (code, line) = failing(&mut command);
         assert_eq!(code, Some(2), "{arguments:?}: {line}");

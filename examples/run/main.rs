@@ -4,11 +4,14 @@
 //! Every step is waited for. All steps count, the first ones too: there is no warm-up.
 
 mod args;
+#[path = "../common/asked.rs"]
+mod asked;
 mod outcome;
 mod pictures;
 mod trace;
 
-use args::{Args, Failure};
+use args::Args;
+use asked::Failure;
 use indicatif::{ProgressBar, ProgressStyle};
 use outcome::Outcome;
 use pictures::{Frames, Pictures};
@@ -22,7 +25,7 @@ use tumble::core::{measures, scenes};
 use tumble::{Backend, World};
 
 fn main() -> ExitCode {
-    let failure = match args::parse().and_then(|args| if args.list { list() } else { run(&args) }) {
+    let failure = match asked::parse().and_then(|args: Args| if args.list { list() } else { run(&args) }) {
         Ok(()) => return ExitCode::SUCCESS,
         Err(failure) => failure,
     };
@@ -57,16 +60,16 @@ fn list() -> Result<(), Failure> {
 
 fn run(args: &Args) -> Result<(), Failure> {
     let params = args.params()?;
-    let (standard, bodies) = args.scene()?;
+    let (standard, bodies) = args.asked.scene(None)?;
     // Before the run, so that a bad path costs no time.
     let size = args.picture_size()?;
     let mut json = args.json.as_deref().map(open).transpose()?;
     let mut trace_file = args.trace.as_deref().map(open).transpose()?;
     let mut png = args.png.as_deref().map(open).transpose()?;
     args.frames.as_deref().map(pictures::make_folder).transpose()?;
-    let mut world = World::new((standard.build)(bodies), params, args.backend())?;
+    let mut world = World::new((standard.build)(bodies), params, args.asked.backend())?;
     #[cfg(feature = "cpu")]
-    if matches!((args.backend(), &world), (Backend::Auto, World::Cpu(_))) {
+    if matches!((args.asked.backend(), &world), (Backend::Auto, World::Cpu(_))) {
         tell("no GPU can be used (software adapters do not count here): running on the CPU");
     }
     let mut outcome = Outcome::new(standard.name, args.steps, &params, world.scene());

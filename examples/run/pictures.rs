@@ -1,6 +1,6 @@
 //! Pictures of a run: `--png` and `--frames`.
 
-use crate::args::Failure;
+use crate::asked::Failure;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tumble::{Error, Poses, World};

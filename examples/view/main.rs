@@ -4,6 +4,8 @@
 //! from the world's own buffer of poses, on the same device. H tells the keys.
 
 mod args;
+#[path = "../common/asked.rs"]
+mod asked;
 mod clock;
 mod grab;
 mod gui;
@@ -15,7 +17,8 @@ mod screen;
 mod simulation;
 mod viewer;
 
-use args::{Args, Failure};
+use args::{Args, SCENE};
+use asked::Failure;
 use std::io::{self, Write};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -26,7 +29,7 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::window::WindowId;
 
 fn main() -> ExitCode {
-    let (code, message) = match args::parse().and_then(show) {
+    let (code, message) = match asked::parse().and_then(show) {
         Ok(()) => return ExitCode::SUCCESS,
         Err(Failure::Argument(message)) => (2, message),
         Err(Failure::Run(message)) => (1, message),
@@ -37,7 +40,8 @@ fn main() -> ExitCode {
 }
 
 fn show(args: Args) -> Result<(), Failure> {
-    args.params()?;
+    args.asked.params()?;
+    args.asked.scene(Some(SCENE))?;
     let event_loop = EventLoop::new().map_err(|error| {
         // Without the place in winit's sources.
         let told = error.to_string();

@@ -1,6 +1,6 @@
 //! The window, and the device that draws into it.
 
-use crate::args::Failure;
+use crate::asked::Failure;
 use std::sync::{Arc, Mutex, PoisonError};
 use tumble::Error;
 use wgpu::{Backends, CurrentSurfaceTexture, DeviceType, Features, InstanceFlags, Limits, TextureFormat};

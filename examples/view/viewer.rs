@@ -1,6 +1,7 @@
 //! A scene in a window: what happens in a frame, and what events do.
 
-use crate::args::{Args, Coloring, Failure};
+use crate::args::{Args, Coloring, SCENE};
+use crate::asked::Failure;
 use crate::grab::Grab;
 use crate::gui::Gui;
 use crate::input::{self, Action, Drag, Pointer};
@@ -56,15 +57,15 @@ impl Viewer {
     /// # Errors
     /// What is wrong with the arguments, the window or the device.
     pub(crate) fn open(event_loop: &ActiveEventLoop, args: &Args) -> Result<Self, Failure> {
-        let (standard, bodies) = args.scene();
+        let (standard, bodies) = args.asked.scene(Some(SCENE))?;
         let screen = Screen::open(event_loop, &format!("tumble – {}", standard.name), args.size)?;
-        let backend = match args.backend() {
+        let backend = match args.asked.backend() {
             Backend::Auto if screen.info.device_type == DeviceType::Cpu => Backend::Cpu,
             Backend::Auto => Backend::Gpu,
             side => side,
         };
         let mut simulation =
-            Simulation::new((standard, bodies), args.params()?, backend, &screen.device, &screen.queue)?;
+            Simulation::new((standard, bodies), args.asked.params()?, backend, &screen.device, &screen.queue)?;
         simulation.is_paused = args.paused;
         let renderer = Renderer::new(&screen.device, screen.format(), simulation.world.scene())?;
         let log = Log::new(args.log_events);

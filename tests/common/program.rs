@@ -1,12 +1,12 @@
-//! The program of `examples/run`, as built.
+//! A program of `examples`, as built.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// The program. Plain `cargo test` has built it beside the tests; one test alone would find an old one there, so cargo
-/// looks again.
-pub(crate) fn program() -> &'static Path {
+/// The program `name`, the only one that its tests ask for. Plain `cargo test` has built it beside the tests; one test
+/// alone would find an old one there, so cargo looks again.
+pub(crate) fn program(name: &str) -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
         let test = std::env::current_exe().unwrap();
@@ -14,15 +14,15 @@ pub(crate) fn program() -> &'static Path {
         if let Some(cargo) = std::env::var_os("CARGO") {
             let release = if cfg!(debug_assertions) { None } else { Some("--release") };
             let build = Command::new(cargo)
-                .args(["build", "--quiet", "--example", "run"])
+                .args(["build", "--quiet", "--example", name])
                 .args(release)
                 .env("CARGO_TARGET_DIR", profile.parent().unwrap())
                 .current_dir(env!("CARGO_MANIFEST_DIR"))
                 .status();
             assert!(build.unwrap().success(), "the example builds");
         }
-        let path = profile.join("examples").join(format!("run{}", std::env::consts::EXE_SUFFIX));
-        assert!(path.exists(), "{} is missing: cargo build --release --example run", path.display());
+        let path = profile.join("examples").join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+        assert!(path.exists(), "{} is missing: cargo build --release --example {name}", path.display());
         path
     })
 }

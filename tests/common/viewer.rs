@@ -1,10 +1,9 @@
 //! The program `examples/view`, run by a test that reads the events it tells.
 
+use crate::program::program;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read};
-use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::OnceLock;
 use std::sync::mpsc::{self, Receiver};
 use std::time::{Duration, Instant};
 use tumble_core::glam::Vec3;
@@ -12,29 +11,6 @@ use tumble_draw::OrbitCamera;
 
 /// No event or picture is waited for any longer. Only a test that fails takes so long.
 pub(crate) const LONGEST: Duration = Duration::from_secs(120);
-
-/// The program. Plain `cargo test` has built it beside the tests; one test alone would find an old one there, so cargo
-/// looks again.
-pub(crate) fn program() -> &'static Path {
-    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| {
-        let test = std::env::current_exe().unwrap();
-        let profile = test.ancestors().nth(2).unwrap();
-        if let Some(cargo) = std::env::var_os("CARGO") {
-            let release = if cfg!(debug_assertions) { None } else { Some("--release") };
-            let build = Command::new(cargo)
-                .args(["build", "--quiet", "--example", "view"])
-                .args(release)
-                .env("CARGO_TARGET_DIR", profile.parent().unwrap())
-                .current_dir(env!("CARGO_MANIFEST_DIR"))
-                .status();
-            assert!(build.unwrap().success(), "the example builds");
-        }
-        let path = profile.join("examples").join("view");
-        assert!(path.exists(), "{} is missing: cargo build --release --example view", path.display());
-        path
-    })
-}
 
 /// The program while it runs; ended with it.
 pub(crate) struct Viewer {
@@ -54,7 +30,7 @@ pub(crate) struct Presented {
 impl Viewer {
     /// Runs it on this display.
     pub(crate) fn start(display: &str, arguments: &[&str]) -> Self {
-        let mut command = Command::new(program());
+        let mut command = Command::new(program("view"));
         command.args(arguments).arg("--log-events").env("DISPLAY", display);
         command.env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
         let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn().unwrap();

@@ -1,7 +1,7 @@
 //! Runs the cases: all engines and settings of a case take turns, so that a noisy machine harms all alike.
 
 use crate::cases::{self, Case, Run};
-use crate::engines::{Contestant, Engine, Facts, Means, Refusal, Setting};
+use crate::engines::{Contestant, Engine, Facts, Means, Setting};
 use crate::machine::Machine;
 use crate::record::{Kind, Outcome, Record};
 use glam::Vec3;
@@ -147,10 +147,13 @@ impl Heat {
     }
 
     fn lane(&self, contestant: &Contestant, setting: &Setting, scene: &Scene, conditions: &Conditions) -> Lane {
-        let (engine, outcome, note) = match (contestant.make)(scene, setting, &conditions.means) {
+        let bodies = cases::dynamic(scene).count();
+        let (engine, outcome, note) = match contestant.start(scene, bodies, setting, &conditions.means) {
             Ok(engine) => (Some(engine), Outcome::Done, String::new()),
-            Err(Refusal::Unmodelled(what)) => (None, Outcome::Unmodelled, what),
-            Err(Refusal::Failed(what)) => (None, Outcome::Failed, what),
+            Err(refusal) => {
+                let (outcome, note) = refusal.told();
+                (None, outcome, note)
+            }
         };
         Lane {
             contestant: *contestant,

@@ -39,20 +39,19 @@ pub fn scaling(bodies: usize, contestants: &[Contestant], conditions: &Condition
             let record = Record { bodies: count as u32, ..conditions.record(Kind::Scaling, SCALED, contestant.name) };
             let setting = Setting { broadphase, ..conditions.setting(DT, SUBSTEPS) };
             let made = match free_memory() {
-                Some(free) if free < needed => Err(Refusal::Failed(format!(
+                Some(free) if free < needed => Err(Refusal::TooMany(format!(
                     "not run: {count} bodies need some {:.0} GB of memory for all engines, {:.0} GB are free",
                     needed as f64 * 1e-9,
                     free as f64 * 1e-9
                 ))),
-                _ => (contestant.make)(&scene, &setting, &conditions.means),
+                _ => contestant.start(&scene, count, &setting, &conditions.means),
             };
             match made {
                 Ok(engine) => lanes.push(Lane { engine, record, times: Vec::new(), over: false }),
-                Err(Refusal::Unmodelled(note)) => records.push(Record { outcome: Outcome::Unmodelled, note, ..record }),
-                Err(Refusal::Failed(note)) if note.starts_with("not run") => {
-                    records.push(Record { outcome: Outcome::Slow, note, ..record });
+                Err(refusal) => {
+                    let (outcome, note) = refusal.told();
+                    records.push(Record { outcome, note, ..record });
                 }
-                Err(Refusal::Failed(note)) => records.push(Record { outcome: Outcome::Failed, note, ..record }),
             }
         }
     }
@@ -156,10 +155,8 @@ fn staged(
     conditions: &Conditions,
     record: &Record,
 ) -> Result<Vec<Record>, String> {
-    let made = (contestant.make)(scene, setting, &conditions.means);
-    let mut engine = made.map_err(|refusal| match refusal {
-        Refusal::Unmodelled(note) | Refusal::Failed(note) => note,
-    })?;
+    let made = contestant.start(scene, dynamic(scene).count(), setting, &conditions.means);
+    let mut engine = made.map_err(|refusal| refusal.told().1)?;
     engine.step(warm_up)?;
     let mut whole = Vec::new();
     // A stage each, in order.

@@ -109,7 +109,7 @@ fn unable(_: &Scene, _: &Setting, _: &Means) -> Result<Box<dyn Engine>, Refusal>
 }
 
 fn contestant(name: &'static str, make: Make) -> Contestant {
-    Contestant { name, cost: [1.0, 1.0], make, available: |_| Ok(()) }
+    Contestant { name, cost: [1.0, 1.0], most_bodies: usize::MAX, make, available: |_| Ok(()) }
 }
 
 fn conditions() -> Conditions {
@@ -140,6 +140,7 @@ fn every_end_is_told_for_what_it_is() {
         contestant("infinite", infinite),
         contestant("not a number", not_a_number),
         contestant("unable", unable),
+        Contestant { most_bodies: 9, ..contestant("small", good) },
     ]);
     let of = |name: &str| records.iter().find(|r| r.engine == name).unwrap_or_else(|| panic!("no line of {name}"));
     for (name, outcome, value, note) in [
@@ -151,6 +152,7 @@ fn every_end_is_told_for_what_it_is() {
         ("not a number", Outcome::Failed, None, "its state is not finite"),
         ("slow", Outcome::Slow, None, "given up: 300 steps would take 150 s, the limit is 20 s"),
         ("unable", Outcome::Unmodelled, None, "no boxes"),
+        ("small", Outcome::Slow, None, "not run: more than 9 bodies"),
     ] {
         let r = of(name);
         assert_eq!((r.outcome, r.value), (outcome, value), "{name}: {}", r.note);

@@ -9,6 +9,7 @@ mod script;
 
 pub use rapier::RapierWorld;
 
+use crate::record::Outcome;
 use std::path::PathBuf;
 use std::time::Instant;
 use tumble_core::{Broadphase, Poses, Scene, StageTime, Velocities};
@@ -70,8 +71,21 @@ pub struct Facts {
 pub enum Refusal {
     /// It has no means for what the scene needs.
     Unmodelled(String),
+    /// The scene is too large for it, or for the machine.
+    TooMany(String),
     /// It is not there, or it failed.
     Failed(String),
+}
+
+impl Refusal {
+    /// As the table has it: how the measurement ended, and the note.
+    pub fn told(self) -> (Outcome, String) {
+        match self {
+            Self::Unmodelled(what) => (Outcome::Unmodelled, what),
+            Self::TooMany(what) => (Outcome::Slow, what),
+            Self::Failed(what) => (Outcome::Failed, what),
+        }
+    }
 }
 
 /// A scene in some engine.
@@ -115,6 +129,8 @@ pub struct Contestant {
     pub name: &'static str,
     /// Milliseconds that a step of one body takes, roughly, for the progress bar: without sub-steps, and a sub-step.
     pub cost: [f64; 2],
+    /// Bodies that it is given at most: with more, its scene alone takes minutes to load.
+    pub most_bodies: usize,
     /// Makes it.
     pub make: Make,
     /// Whether these means let it run; otherwise why not.
@@ -123,15 +139,79 @@ pub struct Contestant {
 
 /// All engines that this program was built with.
 pub const ALL: &[Contestant] = &[
-    Contestant { name: "tumble cpu", cost: [6e-4, 1.5e-4], make: ours::cpu, available: |_| Ok(()) },
-    Contestant { name: "tumble gpu", cost: [2e-3, 1.5e-3], make: ours::gpu, available: ours::has_gpu },
-    Contestant { name: "rapier", cost: [6e-4, 1.5e-4], make: rapier::make, available: |_| Ok(()) },
+    Contestant {
+        name: "tumble cpu",
+        cost: [6e-4, 1.5e-4],
+        most_bodies: usize::MAX,
+        make: ours::cpu,
+        available: |_| Ok(()),
+    },
+    Contestant {
+        name: "tumble gpu",
+        cost: [2e-3, 1.5e-3],
+        most_bodies: usize::MAX,
+        make: ours::gpu,
+        available: ours::has_gpu,
+    },
+    Contestant {
+        name: "rapier",
+        cost: [6e-4, 1.5e-4],
+        most_bodies: usize::MAX,
+        make: rapier::make,
+        available: |_| Ok(()),
+    },
     #[cfg(feature = "box3d")]
-    Contestant { name: "box3d", cost: [4e-4, 1.5e-4], make: box3d::make, available: |_| Ok(()) },
-    Contestant { name: "nexus", cost: [4e-3, 2e-3], make: script::nexus, available: script::has_nexus },
-    Contestant { name: "mujoco", cost: [0.0, 1e-2], make: script::mujoco, available: script::has_mujoco },
-    Contestant { name: "mujoco stiff", cost: [0.0, 1e-2], make: script::stiff_mujoco, available: script::has_mujoco },
+    Contestant {
+        name: "box3d",
+        cost: [4e-4, 1.5e-4],
+        most_bodies: usize::MAX,
+        make: box3d::make,
+        available: |_| Ok(()),
+    },
+    Contestant {
+        name: "nexus",
+        cost: [4e-3, 2e-3],
+        most_bodies: 6000,
+        make: script::nexus,
+        available: script::has_nexus,
+    },
+    Contestant {
+        name: "mujoco",
+        cost: [0.0, 1e-2],
+        most_bodies: 1000,
+        make: script::mujoco,
+        available: script::has_mujoco,
+    },
+    Contestant {
+        name: "mujoco stiff",
+        cost: [0.0, 1e-2],
+        most_bodies: 1000,
+        make: script::stiff_mujoco,
+        available: script::has_mujoco,
+    },
 ];
+
+impl Contestant {
+    /// Makes the scene in the engine, if it may have so many bodies.
+    ///
+    /// # Errors
+    /// Why it does not run.
+    pub fn start(
+        &self,
+        scene: &Scene,
+        bodies: usize,
+        setting: &Setting,
+        means: &Means,
+    ) -> Result<Box<dyn Engine>, Refusal> {
+        if bodies > self.most_bodies {
+            return Err(Refusal::TooMany(format!(
+                "not run: more than {} bodies take minutes to load",
+                self.most_bodies
+            )));
+        }
+        (self.make)(scene, setting, means)
+    }
+}
 
 /// Differences that hold for a whole engine, whatever the scene: engine, and what a reader must know.
 pub const DIFFERS: &[(&str, &str)] = &[
