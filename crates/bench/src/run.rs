@@ -221,8 +221,10 @@ impl Lane {
             let Some(engine) = &mut self.engine else { return };
             // The first step alone: it compiles and allocates.
             let chunk = if track || self.done == 0 { 1 } else { goal - self.done };
-            // Small bites while it is unknown what a step takes.
-            let chunk = if self.done < 8 { chunk.min(2) } else { chunk };
+            // Small bites while it is unknown what a step takes, and none that takes much of the limit.
+            let pace = self.spent / self.done.saturating_sub(1).max(1) as f64;
+            let bite = if self.done < 8 { 2 } else { (0.1 * limit / pace) as u64 };
+            let chunk = chunk.min(bite.max(1));
             match engine.step(chunk as u32) {
                 Ok(times) => {
                     if self.done > 0 {
