@@ -90,6 +90,9 @@ impl Table {
     fn open(args: &Args, folder: &Path, machine: &Machine) -> Result<Self, String> {
         std::fs::create_dir_all(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))?;
         let path = folder.join(NAME).with_extension("csv");
+        if args.report && !path.exists() {
+            return Err(format!("there is no table {}; measure first, without --report", path.display()));
+        }
         let records = if path.exists() && !args.fresh { record::read(&path)? } else { Vec::new() };
         let other = records.iter().find(|r| r.commit != machine.commit || r.machine != machine.name);
         if let (Some(other), false) = (other, args.report) {

@@ -95,7 +95,12 @@ pub struct Record {
 /// When the file cannot be read or a line is no [`Record`]; says which.
 pub fn read(path: &Path) -> Result<Vec<Record>, String> {
     let told = |error: csv::Error| format!("{}: {error}", path.display());
-    csv::Reader::from_path(path).map_err(told)?.into_deserialize().collect::<Result<_, _>>().map_err(told)
+    let mut reader = csv::Reader::from_path(path).map_err(told)?;
+    // Without a line below them, wrong columns would pass for an empty table.
+    if !reader.headers().map_err(told)?.iter().any(|name| name == "commit") {
+        return Err(format!("{} is not a table of this bench: it has no column \"commit\"", path.display()));
+    }
+    reader.into_deserialize().collect::<Result<_, _>>().map_err(told)
 }
 
 /// Writes a table. The file is replaced as a whole, so that a run that ends in the middle leaves the old one.

@@ -232,6 +232,9 @@ fn a_table_is_read_as_it_was_written() {
     assert_eq!(record::read(&path).expect("read"), records);
     std::fs::write(&path, "kind,case\ncase,x\n").expect("written");
     let error = record::read(&path).expect_err("a table of other columns");
+    assert!(error.contains("t.csv") && error.contains("commit"), "{error}");
+    std::fs::write(&path, "kind,case,commit\ncase,x,y\n").expect("written");
+    let error = record::read(&path).expect_err("a line that lacks columns");
     assert!(error.contains("t.csv") && error.contains("engine"), "{error}");
     assert!(record::write(&folder.path().join("none/t.csv"), &records).is_err());
     assert!(record::read(&folder.path().join("none.csv")).is_err());
