@@ -15,10 +15,10 @@ executables() {
     cargo "$@" --no-run --message-format=json | sed -n 's/.*"executable":"\([^"]*\)".*/\1/p'
 }
 
-executables test --release --test '*' | while read -r path; do
+executables test --release --tests | while read -r path; do
     name=$(basename "$path" | sed 's/-[0-9a-f]*$//')
     case $name in
-    parity_* | primitives | world_broadphase | world_capacity | world_determinism | queries*) cp "$path" "$folder/tests/$name" ;;
+    parity_* | primitives | contacts | draw | world_broadphase | world_capacity | world_determinism | queries*) cp "$path" "$folder/tests/$name" ;;
     esac
 done
 executables bench --features box3d | while read -r path; do
