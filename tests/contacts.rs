@@ -6,8 +6,10 @@ mod floats;
 #[expect(dead_code, reason = "no rays and no points")]
 #[path = "common/parry.rs"]
 mod parry;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/random.rs"]
 mod random;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/worlds.rs"]
 mod worlds;
 

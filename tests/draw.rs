@@ -4,6 +4,7 @@
 mod common;
 #[path = "common/picture.rs"]
 mod picture;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/random.rs"]
 mod random;
 

@@ -2,6 +2,7 @@
 //! analysis, the picture in another format, naga.
 
 mod common;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/picture.rs"]
 mod picture;
 

@@ -6,6 +6,7 @@ mod common;
 mod program;
 #[path = "../examples/run/trace.rs"]
 mod trace;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/worlds.rs"]
 mod worlds;
 

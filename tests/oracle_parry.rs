@@ -3,6 +3,7 @@
 
 #[path = "common/parry_shapes.rs"]
 mod parry_shapes;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/random.rs"]
 mod random;
 

@@ -1,7 +1,6 @@
 //! Stage `broadphase`, pass by pass: the GPU computes what the CPU does, in every order of invocations. Oracle: the
 //! mirror; for the pairs, every box against every other.
 
-#[allow(dead_code, reason = "some passes want an index")]
 #[path = "common/alone.rs"]
 mod alone;
 mod common;

@@ -4,7 +4,7 @@
 //! Tolerances are shares of the largest number of a field in one element, or of 1; beside each is the largest error
 //! that was measured (llvmpipe).
 
-#[allow(dead_code, reason = "some passes want an index")]
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/alone.rs"]
 mod alone;
 mod common;

@@ -5,6 +5,7 @@
 #[path = "common/alone.rs"]
 mod alone;
 mod common;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/random.rs"]
 mod random;
 

@@ -11,6 +11,7 @@ mod floats;
 #[expect(dead_code, reason = "a part of a frame is enough here")]
 #[path = "common/frame.rs"]
 mod frame;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/stage.rs"]
 mod stage;
 

@@ -7,8 +7,10 @@ mod common;
 mod parry;
 #[path = "common/queries.rs"]
 mod queries;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/random.rs"]
 mod random;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/worlds.rs"]
 mod worlds;
 

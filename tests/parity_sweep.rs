@@ -9,6 +9,7 @@ mod common;
 mod crowds;
 #[path = "common/random.rs"]
 mod random;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/worlds.rs"]
 mod worlds;
 

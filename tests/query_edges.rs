@@ -8,8 +8,10 @@ mod parry;
 #[expect(dead_code, reason = "it asks its own questions")]
 #[path = "common/queries.rs"]
 mod queries;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/random.rs"]
 mod random;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/worlds.rs"]
 mod worlds;
 

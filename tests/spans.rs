@@ -2,6 +2,7 @@
 //! and nesting are those of the documentation.
 
 mod common;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/worlds.rs"]
 mod worlds;
 

@@ -1,6 +1,7 @@
 //! Whatever finds the pairs, the world is the same, bit for bit. Oracle: brute force.
 
 mod common;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/worlds.rs"]
 mod worlds;
 

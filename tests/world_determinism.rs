@@ -5,6 +5,7 @@ mod common;
 #[expect(dead_code, reason = "a part of a frame is enough here")]
 #[path = "common/frame.rs"]
 mod frame;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/worlds.rs"]
 mod worlds;
 

@@ -1,6 +1,7 @@
 //! Changes between steps, without building the world anew: each does what it says, on both sides.
 
 mod common;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/worlds.rs"]
 mod worlds;
 

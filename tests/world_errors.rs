@@ -2,6 +2,7 @@
 //! a panic, and a world that was good stays good. Oracle: analysis, but where a test names another.
 
 mod common;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/worlds.rs"]
 mod worlds;
 

@@ -2,6 +2,7 @@
 //! those of a run in which it was frozen by hand at the same step.
 
 mod common;
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/worlds.rs"]
 mod worlds;
 

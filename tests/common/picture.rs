@@ -1,5 +1,4 @@
 //! Pictures of scenes, and what can be told of their pixels.
-#![allow(dead_code, reason = "each test program uses a part")]
 
 use crate::common::gpu;
 use glam::{Vec2, Vec3};

@@ -1,5 +1,4 @@
 //! Random bodies and colliders, the same on every machine.
-#![allow(dead_code, reason = "each test program uses a part")]
 
 use bytemuck::Zeroable;
 use tumble_core::Params;

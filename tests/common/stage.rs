@@ -1,5 +1,4 @@
 //! A scene in mid-motion on both sides: what the passes of `solver` and `motion` read.
-#![allow(dead_code, reason = "each test program uses a part")]
 
 use bytemuck::Zeroable;
 use tumble_core::layout::*;

@@ -1,5 +1,4 @@
 //! The same scene on either side, behind one face.
-#![allow(dead_code, reason = "each test program uses a part")]
 
 use tumble::World;
 use tumble_core::{Params, Result, Scene, StepReport, measures};
