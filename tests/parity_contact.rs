@@ -1,7 +1,7 @@
 //! Stage `contact` alone, over steps in which pairs and colliders come and go: the GPU hands out the same slots as the
 //! CPU and keeps the same things in them, in every order of invocations. Oracle: the mirror.
 
-#[allow(dead_code, reason = "some passes want an index")]
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/alone.rs"]
 mod alone;
 mod common;

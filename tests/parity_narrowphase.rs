@@ -6,7 +6,7 @@
 //! bodies are moved by a few micrometres, are left out and counted. Tolerances are shares of the largest number of a
 //! field in one manifold or point, or of 1; beside each is the largest error that was measured (llvmpipe).
 
-#[allow(dead_code, reason = "some passes want an index")]
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/alone.rs"]
 mod alone;
 mod common;

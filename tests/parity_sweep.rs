@@ -1,7 +1,7 @@
 //! Stage `broadphase/sweep`: the CPU finds what brute force finds, and the GPU computes what the CPU does, pass by pass,
 //! in every order of invocations. Oracles: brute force, and the mirror.
 
-#[allow(dead_code, reason = "some passes want an index")]
+#[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/alone.rs"]
 mod alone;
 mod common;
