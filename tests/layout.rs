@@ -87,13 +87,13 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         FoundManifold { rotation_a, rotation_b, manifold }
         ConstraintHead {
             normal, friction, body_a, body_b, slot, count, restitution, bias_rate, mass_scale, impulse_scale,
-            remembered, round_a, round_b, pad_a
+            remembered, round_a, round_b, pad_a, between, pad_b
         }
         ConstraintPoint {
-            anchor_a, adjusted_separation, anchor_b, normal_mass, tangent_mass, approach, max_impulse, pad_a
+            anchor, adjusted_separation, normal_mass, tangent_mass, approach, pad_a, total, pad_b
         }
         Impulse { normal, tangent, feature }
-        ManifoldMemory { remembered, pad_a, pad_b, pad_c }
+        ManifoldMemory { remembered, pad_a, pad_b, pad_c, totals }
         Control {
             stop, overflow, needed, step, old_pair_count, free_count, recolor, frozen_count, pair_count, processed,
             new_count, dead_count, constraint_count, point_count, batch_count, rounds, unplaced, last_count,

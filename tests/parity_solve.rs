@@ -34,8 +34,8 @@ mod off {
     // 1.3e-4 8.2e-3 1.2e-4
     pub(crate) const LONG: [Field; 3] = [("velocity", 5e-4), ("impulse", 2e-2), ("approach", 5e-4)];
     // Eight sub-steps of the one pass: the last bit decides which contact closes a gap and which one presses, and in a
-    // heap of 3,000 bodies some decide otherwise. (Soft, four: 8.2e-5 1.1e-4 8.0e-5.) 1.7e-2 2.0e-2 6.6e-3
-    pub(crate) const STEP: [Field; 3] = [("velocity", 5e-2), ("impulse", 5e-2), ("approach", 2e-2)];
+    // heap of 3,000 bodies some decide otherwise. (Soft, four: 8.2e-5 1.1e-4 8.0e-5.) 1.7e-2 2.0e-2 2.3e-2
+    pub(crate) const STEP: [Field; 3] = [("velocity", 5e-2), ("impulse", 5e-2), ("approach", 5e-2)];
     pub(crate) const WEIGHT: Field = ("weight", 1e-5); // 0
     pub(crate) const STEP_WAY: Field = ("translation", 2e-4); // 6.0e-5
     pub(crate) const STEP_TURN: Field = ("turn", 3e-4); // 8.1e-5
@@ -71,9 +71,10 @@ fn check_solver(
     floats.check(what, impulse, (&changes(&impulses[0]), &changes(&impulses[1])), |change| *change);
     assert!(impulses[0].iter().map(|i| i.feature).eq(impulses[1].iter().map(|i| i.feature)), "{what}: features");
     let both = (&used(&cpu.1.heads, &cpu.1.points)[..], &used(&cpu.1.heads, &gpu.1.points)[..]);
-    let highest =
-        |points: &[ConstraintPoint]| -> Vec<f32> { points.iter().zip(&mass).map(|(p, m)| p.max_impulse / m).collect() };
-    floats.check(what, impulse, (&highest(both.0), &highest(both.1)), |x| [*x]);
+    let totals = |points: &[ConstraintPoint]| -> Vec<[f32; 3]> {
+        points.iter().zip(&mass).map(|(p, m)| p.total.map(|total| total / m)).collect()
+    };
+    floats.check(what, impulse, (&totals(both.0), &totals(both.1)), |x| *x);
     floats.check(what, approach, both, |p| [p.approach]);
 }
 
@@ -109,7 +110,7 @@ fn prepare_builds_the_mirrors_rows() {
             let heads = &rows.heads;
             assert!(used(heads, &rows.impulses) == used(heads, &stage.rows.impulses), "{what}: impulses");
             let both = (&used(heads, &stage.rows.points)[..], &used(heads, &rows.points)[..]);
-            let exact = |p: &ConstraintPoint| (p.anchor_a, p.anchor_b, p.max_impulse, p.pad_a);
+            let exact = |p: &ConstraintPoint| (p.anchor, p.total, p.pad_a, p.pad_b);
             assert!(both.0.iter().map(exact).eq(both.1.iter().map(exact)), "{what}: points");
             floats.check(&what, off::SEPARATION, both, |p| [p.adjusted_separation]);
             floats.check(&what, off::MASSES, both, |p| [p.normal_mass, p.tangent_mass]);

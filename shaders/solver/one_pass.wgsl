@@ -44,13 +44,9 @@ fn pass_normal(
     step: StepParams,
 ) {
     let normal = head.normal;
-    let ra = (*point).anchor_a;
-    let rb = (*point).anchor_b;
-    let velocity = dot(normal, relative_velocity(a, b, ra, rb));
+    let r = arms(head, point);
+    let velocity = dot(normal, relative_velocity(a, b, r[0], r[1]));
     let separation = separation_of(head, point, a, b);
-    if (*point).max_impulse == 0.0 {
-        (*point).approach = min((*point).approach, velocity);
-    }
     let mass = (*point).normal_mass;
     let pressed = (*impulse).normal > 0.0 && separation * mass < step.memory_band * head.remembered;
     var change = 0.0;
@@ -68,8 +64,11 @@ fn pass_normal(
         let new_normal = max(sum, 0.0);
         let push = new_normal - (*impulse).normal;
         (*impulse).normal = new_normal;
-        (*point).max_impulse = max((*point).max_impulse, new_normal);
-        apply(a, b, ra, rb, push * normal);
+        apply(a, b, r[0], r[1], push * normal);
+        // Without the last sub-step's gravity: a bounce must not gain by it.
+        if new_normal == 0.0 && (*point).total.x == 0.0 {
+            (*point).approach = min((*point).approach, velocity);
+        }
     }
 }
 
@@ -92,15 +91,13 @@ fn remember(
 
 // Counts `push` to what the sub-step began with.
 fn start_after(
-    point: ptr<function, ConstraintPoint>,
+    r: mat2x3<f32>,
     push: vec3<f32>,
     a: ptr<function, SolverBody>,
     b: ptr<function, SolverBody>,
 ) {
-    let ra = (*point).anchor_a;
-    let rb = (*point).anchor_b;
     (*a).linear_start = (*a).linear_start - (*a).inverse_mass * push;
-    (*a).angular_start = (*a).angular_start - inverse_inertia_times(a, cross(ra, push));
+    (*a).angular_start = (*a).angular_start - inverse_inertia_times(a, cross(r[0], push));
     (*b).linear_start = (*b).linear_start + (*b).inverse_mass * push;
-    (*b).angular_start = (*b).angular_start + inverse_inertia_times(b, cross(rb, push));
+    (*b).angular_start = (*b).angular_start + inverse_inertia_times(b, cross(r[1], push));
 }

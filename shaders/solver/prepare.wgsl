@@ -159,11 +159,11 @@ fn constraints(
         points[4u * c + i] = ConstraintPoint(
             ra,
             point.separation - (dot(normal, rb - ra) - (round_b - round_a)),
-            rb,
             inverse(response(a, b, ra, rb, normal, normal)),
             inverse(stiffest),
             dot(normal, dv),
-            0.0,
+            0u,
+            vec3<f32>(),
             0u,
         );
     }
@@ -196,6 +196,7 @@ fn constraints(
     }
     head.round_a = round_a;
     head.round_b = round_b;
+    head.between = between;
     heads[c] = head;
 }
 

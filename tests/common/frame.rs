@@ -173,9 +173,7 @@ impl Cpu {
         for (c, &index) in frame.batches.order.iter().enumerate() {
             let slot = frame.matched.pairs[index as usize].slot as usize;
             for point in 0..4 {
-                let impulse = &rows.impulses[4 * c + point];
-                impulses[4 * slot + point] =
-                    store::store(&frame.manifolds[index as usize], point, impulse.normal, impulse.tangent);
+                impulses[4 * slot + point] = store::store(&frame.manifolds[index as usize], point, &rows.solved(c));
             }
         }
         impulses
@@ -184,9 +182,9 @@ impl Cpu {
     /// The same of what slots remember of manifolds.
     pub(crate) fn remembered(&self, frame: &Frame, rows: &PlainRows) -> Vec<ManifoldMemory> {
         let mut memory = self.memory.clone();
-        for (head, &index) in rows.heads.iter().zip(&frame.batches.order) {
+        for (c, &index) in frame.batches.order.iter().enumerate() {
             let slot = frame.matched.pairs[index as usize].slot as usize;
-            memory[slot] = store::store_memory(&frame.manifolds[index as usize], head.remembered);
+            memory[slot] = store::store_memory(&frame.manifolds[index as usize], &rows.solved(c));
         }
         memory
     }

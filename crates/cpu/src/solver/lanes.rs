@@ -1,6 +1,7 @@
 //! Four constraints side by side, for the fast form of the visits (`soft_lanes`). The plain form is `soft`.
 
 use super::push_lanes;
+use super::store::Solved;
 use crate::shared::Shared;
 use std::ops::{Add, Mul, Sub};
 use tumble_core::layout::{ConstraintHead, Impulse, ManifoldPoint, SolverBody, StepParams};
@@ -70,13 +71,12 @@ fn set(lanes: &mut f32x4, lane: usize, value: f32) {
 /// One point of each of four constraints, with its impulse. Unused lanes are zero: they push nothing.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct PointLanes {
-    pub(crate) anchor_a: V3,
-    pub(crate) anchor_b: V3,
+    pub(crate) anchor: V3,
     pub(crate) adjusted_separation: f32x4,
     pub(crate) normal_mass: f32x4,
     pub(crate) tangent_mass: f32x4,
     pub(crate) approach: f32x4,
-    pub(crate) max_impulse: f32x4,
+    pub(crate) total: [f32x4; 3],
     pub(crate) normal: f32x4,
     pub(crate) tangent: [f32x4; 2],
 }
@@ -146,7 +146,7 @@ impl ConstraintLanes {
     /// Puts a point with its impulse into a lane; masses and the other arm follow for all lanes at once.
     pub(crate) fn set_point(&mut self, lane: usize, point: usize, at: &ManifoldPoint, impulse: &Impulse) {
         let to = &mut self.points[point];
-        to.anchor_a.set(lane, at.anchor);
+        to.anchor.set(lane, at.anchor);
         set(&mut to.adjusted_separation, lane, at.separation);
         set(&mut to.normal, lane, impulse.normal);
         set(&mut to.tangent[0], lane, impulse.tangent[0]);
@@ -170,19 +170,18 @@ impl ConstraintLanes {
 
     /// The arms of one point.
     pub(crate) fn arms(&self, point: usize) -> [V3; 2] {
-        [self.points[point].anchor_a, self.points[point].anchor_b]
+        push_lanes::arms(&self.head, &self.points[point])
     }
 
-    /// What the constraint of one lane remembers, per point.
-    pub(crate) fn remembered(&self, lane: usize) -> f32 {
-        self.head.remembered.as_array()[lane]
-    }
-
-    /// The accumulated impulse of one point of one lane.
-    pub(crate) fn impulse(&self, lane: usize, point: usize) -> (f32, [f32; 2]) {
-        let p = &self.points[point];
+    /// What the solver leaves of the constraint of one lane.
+    pub(crate) fn solved(&self, lane: usize) -> Solved {
         let at = |l: &f32x4| l.as_array()[lane];
-        (at(&p.normal), [at(&p.tangent[0]), at(&p.tangent[1])])
+        let points = &self.points;
+        Solved {
+            impulses: std::array::from_fn(|k| (at(&points[k].normal), points[k].tangent.each_ref().map(at))),
+            totals: std::array::from_fn(|k| points[k].total.each_ref().map(at)),
+            remembered: at(&self.head.remembered),
+        }
     }
 }
 

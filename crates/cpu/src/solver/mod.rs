@@ -30,6 +30,7 @@ use crate::shared::Shared;
 use lanes::{BodyLanes, ConstraintLanes, LANES};
 use prepare::Contact;
 use rayon::prelude::*;
+use store::Solved;
 use tumble_core::layout::{
     BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Impulse, LAST_BATCH, SolverBody, StepParams,
     solver,
@@ -131,18 +132,15 @@ impl Rows {
         self.last = PlainRows::build(last, |c| prepare::prepare_constraint(&contact(c), colliders, bodies, step));
     }
 
-    /// Calls `take(c, remembered, impulses)` for every constraint, with (normal, tangent) of its four points, used or not;
-    /// from many threads at once.
-    pub fn for_each_constraint(&self, take: impl Fn(usize, f32, [(f32, [f32; 2]); 4]) + Sync) {
+    /// Calls `take(c, solved)` for every constraint, from many threads at once.
+    pub fn for_each_constraint(&self, take: impl Fn(usize, &Solved) + Sync) {
         self.groups.par_iter().zip(&self.members).with_min_len(64).for_each(|(group, &(first, count))| {
             for lane in 0..count as usize {
-                let impulses = std::array::from_fn(|point| group.impulse(lane, point));
-                take(first as usize + lane, group.remembered(lane), impulses);
+                take(first as usize + lane, &group.solved(lane));
             }
         });
-        for (i, (head, four)) in self.last.heads.iter().zip(self.last.impulses.chunks_exact(4)).enumerate() {
-            let impulses = std::array::from_fn(|point| (four[point].normal, four[point].tangent));
-            take(self.last_first + i, head.remembered, impulses);
+        for c in 0..self.last.heads.len() {
+            take(self.last_first + c, &self.last.solved(c));
         }
     }
 
@@ -209,6 +207,16 @@ impl PlainRows {
             rows.impulses.extend(impulses);
         }
         rows
+    }
+
+    /// What the solver leaves of constraint c.
+    pub fn solved(&self, c: usize) -> Solved {
+        let (points, impulses) = (&self.points[4 * c..][..4], &self.impulses[4 * c..][..4]);
+        Solved {
+            impulses: std::array::from_fn(|k| (impulses[k].normal, impulses[k].tangent)),
+            totals: std::array::from_fn(|k| points[k].total),
+            remembered: self.heads[c].remembered,
+        }
     }
 
     /// One visit to every constraint, in order. Within a batch the order is of no account.

@@ -13,7 +13,7 @@
 //! its neighbours' along the load, step by step. The weighted mean stays that of the whole, so that the bound holds, and
 //! every part of a pile gets the rate of its own neighbourhood, with no sum over islands.
 
-use super::push::{apply, push_tangent, relative_velocity, separation, warm_start};
+use super::push::{apply, arms, count, push_tangent, relative_velocity, separation, warm_start};
 use crate::math::{finite, inverse_inertia_times, quat, rotate_back, vec3};
 use glam::Vec3;
 use tumble_core::layout::{BodyProps, BodyState, ConstraintHead, ConstraintPoint, Impulse, SolverBody, StepParams};
@@ -50,7 +50,7 @@ pub(super) fn load(
 /// One visit to one constraint: normals first, then friction within the cone that they allow, then the memory.
 pub(super) fn pass(
     head: &mut ConstraintHead,
-    [t1, t2]: [Vec3; 2],
+    tangents: [Vec3; 2],
     points: &mut [ConstraintPoint],
     impulses: &mut [Impulse],
     a: &mut SolverBody,
@@ -62,8 +62,9 @@ pub(super) fn pass(
         before[k] = (impulse.normal, impulse.tangent);
         push_normal(head, point, impulse, a, b, step);
     }
-    for (point, impulse) in points.iter().zip(impulses.iter_mut()) {
-        push_tangent(head.friction, t1, t2, point, impulse, a, b);
+    for (point, impulse) in points.iter_mut().zip(impulses.iter_mut()) {
+        push_tangent(head, tangents, point, impulse, a, b);
+        count(point, impulse);
     }
     remember(head, impulses, a, b, step);
     for (k, (point, impulse)) in points.iter().zip(impulses).enumerate() {
@@ -72,7 +73,8 @@ pub(super) fn pass(
         let blow = impulse.normal - normal;
         if blow > step.blow_speed * point.normal_mass {
             let (x, y) = (impulse.tangent[0] - tangent[0], impulse.tangent[1] - tangent[1]);
-            start_after(point, blow * vec3(head.normal) + x * t1 + y * t2, a, b);
+            let push = blow * vec3(head.normal) + x * tangents[0] + y * tangents[1];
+            start_after(arms(head, point), push, a, b);
             (impulse.normal, impulse.tangent) = (normal, tangent);
         }
     }
@@ -89,12 +91,9 @@ fn push_normal(
     step: &StepParams,
 ) {
     let normal = vec3(head.normal);
-    let (ra, rb) = (vec3(point.anchor_a), vec3(point.anchor_b));
+    let [ra, rb] = arms(head, point);
     let velocity = normal.dot(relative_velocity(a, b, ra, rb));
     let separation = separation(head, point, a, b);
-    if point.max_impulse == 0.0 {
-        point.approach = point.approach.min(velocity);
-    }
     let mass = point.normal_mass;
     let pressed = impulse.normal > 0.0 && separation * mass < step.memory_band * head.remembered;
     let change = if separation > 0.0 && !pressed {
@@ -111,8 +110,11 @@ fn push_normal(
         let new = sum.max(0.0);
         let push = new - impulse.normal;
         impulse.normal = new;
-        point.max_impulse = point.max_impulse.max(new);
         apply(a, b, ra, rb, push * normal);
+        // Without the last sub-step's gravity: a bounce must not gain by it.
+        if new == 0.0 && point.total[0] == 0.0 {
+            point.approach = point.approach.min(velocity);
+        }
     }
 }
 
@@ -135,8 +137,7 @@ fn eigenvalues(a: &SolverBody, b: &SolverBody) -> [f32; 2] {
 }
 
 /// Counts `push` to what the sub-step began with.
-fn start_after(point: &ConstraintPoint, push: Vec3, a: &mut SolverBody, b: &mut SolverBody) {
-    let (ra, rb) = (vec3(point.anchor_a), vec3(point.anchor_b));
+fn start_after([ra, rb]: [Vec3; 2], push: Vec3, a: &mut SolverBody, b: &mut SolverBody) {
     a.linear_start = (vec3(a.linear_start) - a.inverse_mass * push).to_array();
     a.angular_start = (vec3(a.angular_start) - inverse_inertia_times(a, ra.cross(push))).to_array();
     b.linear_start = (vec3(b.linear_start) + b.inverse_mass * push).to_array();

@@ -2,7 +2,7 @@
 
 use super::lanes::{BodyLanes, ConstraintLanes, HeadLanes, LANES, PointLanes, V3, Weights};
 use super::one_pass::FADE;
-use super::push_lanes::{apply, push_tangent, separation, warm_start};
+use super::push_lanes::{apply, arms, count, push_tangent, separation, warm_start};
 use tumble_core::layout::StepParams;
 use wide::f32x4;
 
@@ -37,6 +37,7 @@ pub(super) fn pass(
     }
     for p in points.iter_mut() {
         push_tangent(head, p, a, b);
+        count(p);
     }
     remember(head, points, a, b, step);
     let mut blows = [None; 4];
@@ -56,11 +57,9 @@ pub(super) fn pass(
 
 #[inline(always)]
 fn push_normal(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLanes, b: &mut BodyLanes, step: &StepParams) {
-    let (normal, ra, rb, mass) = (head.normal, p.anchor_a, p.anchor_b, p.normal_mass);
+    let (normal, [ra, rb], mass) = (head.normal, arms(head, p), p.normal_mass);
     let velocity = normal.dot(b.velocity_at(rb) - a.velocity_at(ra));
     let separation = separation(head, p, a, b);
-    let first = p.max_impulse.simd_eq(f32x4::ZERO);
-    p.approach = first.bitselect(p.approach.fast_min(velocity), p.approach);
     let band = f32x4::splat(step.memory_band) * head.remembered;
     let pressed = p.normal.simd_gt(f32x4::ZERO) & (separation * mass).simd_lt(band);
     let apart = separation.simd_gt(f32x4::ZERO) & !pressed;
@@ -75,7 +74,8 @@ fn push_normal(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLanes, b: &mut 
     let good = sum.is_finite();
     let push = good.bitselect(push, f32x4::ZERO);
     p.normal = good.bitselect(new, p.normal);
-    p.max_impulse = good.bitselect(p.max_impulse.fast_max(new), p.max_impulse);
+    let free = good & new.simd_eq(f32x4::ZERO) & p.total[0].simd_eq(f32x4::ZERO);
+    p.approach = free.bitselect(p.approach.fast_min(velocity), p.approach);
     apply(a, b, ra, rb, push * normal);
 }
 

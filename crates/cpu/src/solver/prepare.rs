@@ -82,14 +82,14 @@ pub fn prepare_constraint(
         let stiffest = 0.5 * (k11 + k22) + (0.25 * (k11 - k22) * (k11 - k22) + k12 * k12).sqrt();
         let dv = point_velocity(b, rb) - point_velocity(a, ra);
         points[i] = ConstraintPoint {
-            anchor_a: ra.to_array(),
+            anchor: ra.to_array(),
             adjusted_separation: manifold.points[i].separation - (normal.dot(rb - ra) - (head.round_b - head.round_a)),
-            anchor_b: rb.to_array(),
             normal_mass: inverse(along(normal, normal)),
             tangent_mass: inverse(stiffest),
             approach: normal.dot(dv),
-            max_impulse: 0.0,
             pad_a: 0,
+            total: [0.0; 3],
+            pad_b: 0,
         };
         impulses[i] = carry(contact, i);
     }
@@ -126,6 +126,8 @@ pub(super) fn prepare_head(
         round_a: round(ca, manifold),
         round_b: -round(cb, manifold),
         pad_a: 0,
+        between: manifold.between,
+        pad_b: 0,
     }
 }
 

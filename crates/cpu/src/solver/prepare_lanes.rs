@@ -1,6 +1,7 @@
 //! The points of `prepare`, four constraints at a time: the same operations in the same order, so the same results.
 
 use super::lanes::{BodyLanes, ConstraintLanes, V3};
+use super::push_lanes::arms;
 use wide::f32x4;
 
 /// Fills in what follows from the geometry: tangents, the other arm, masses, approach. `bodies` as rows.
@@ -14,13 +15,11 @@ pub(super) fn prepare(c: &mut ConstraintLanes, bodies: &[f32x4]) {
     let half = f32x4::splat(0.5);
     for (k, p) in points.iter_mut().enumerate() {
         let used = head.counts.simd_gt(f32x4::splat(k as f32));
-        let ra = p.anchor_a;
-        let rb = ra - head.between;
+        let [ra, rb] = arms(head, p);
         let along = |u: V3, v: V3| response(&a, &b, ra, rb, u, v);
         let (k11, k12, k22) = (along(t1, t1), along(t1, t2), along(t2, t2));
         let apart = f32x4::splat(0.25) * (k11 - k22) * (k11 - k22) + k12 * k12;
         let stiffest = half * (k11 + k22) + apart.sqrt();
-        p.anchor_b = rb;
         p.adjusted_separation -= normal.dot(rb - ra) - (head.round_b - head.round_a);
         p.normal_mass = used & inverse(along(normal, normal));
         p.tangent_mass = used & inverse(stiffest);

@@ -2,7 +2,7 @@
 
 use super::Visit;
 use super::lanes::{BodyLanes, ConstraintLanes, HeadLanes, PointLanes};
-use super::push_lanes::{apply, push_tangent, separation};
+use super::push_lanes::{apply, arms, count, push_tangent, separation};
 use tumble_core::layout::StepParams;
 use wide::f32x4;
 
@@ -15,6 +15,9 @@ pub(super) fn visit(visit: Visit, c: &mut ConstraintLanes, a: &mut BodyLanes, b:
     }
     for p in points {
         push_tangent(head, p, a, b);
+        if visit == Visit::Relax {
+            count(p);
+        }
     }
 }
 
@@ -27,7 +30,7 @@ fn push_normal(
     b: &mut BodyLanes,
     step: &StepParams,
 ) {
-    let (normal, ra, rb) = (head.normal, p.anchor_a, p.anchor_b);
+    let (normal, [ra, rb]) = (head.normal, arms(head, p));
     let velocity = normal.dot(b.velocity_at(rb) - a.velocity_at(ra));
     let separation = separation(head, p, a, b);
     let apart = separation.simd_gt(f32x4::ZERO);
@@ -37,7 +40,7 @@ fn push_normal(
         let pull = (head.bias_rate * separation).fast_max(f32x4::splat(-step.push_speed));
         (pull, apart.bitselect(f32x4::ONE, mass_scale), apart.bitselect(f32x4::ZERO, impulse_scale))
     } else {
-        let first = p.max_impulse.simd_eq(f32x4::ZERO);
+        let first = p.total[0].simd_eq(f32x4::ZERO) & p.normal.simd_eq(f32x4::ZERO);
         p.approach = first.bitselect(p.approach.fast_min(velocity), p.approach);
         (f32x4::ZERO, f32x4::ONE, f32x4::ZERO)
     };
@@ -49,6 +52,5 @@ fn push_normal(
     let good = sum.is_finite();
     let push = good.bitselect(push, f32x4::ZERO);
     p.normal = good.bitselect(new, p.normal);
-    p.max_impulse = good.bitselect(p.max_impulse.fast_max(new), p.max_impulse);
     apply(a, b, ra, rb, push * normal);
 }

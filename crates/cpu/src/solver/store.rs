@@ -3,9 +3,21 @@
 use crate::contact::NO_FEATURE;
 use tumble_core::layout::{Impulse, Manifold, ManifoldMemory};
 
+/// What the solver leaves of a constraint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solved {
+    /// Normal and tangential impulse of the last sub-step, by point; of points not in use too.
+    pub impulses: [(f32, [f32; 2]); 4],
+    /// Sums over the sub-steps.
+    pub totals: [[f32; 3]; 4],
+    /// What a point bears in the long run.
+    pub remembered: f32,
+}
+
 /// What the slot remembers of one point.
-pub fn store(manifold: &Manifold, point: usize, normal: f32, tangent: [f32; 2]) -> Impulse {
+pub fn store(manifold: &Manifold, point: usize, solved: &Solved) -> Impulse {
     if point < manifold.count as usize {
+        let (normal, tangent) = solved.impulses[point];
         Impulse { normal, tangent, feature: manifold.features[point] }
     } else {
         Impulse { normal: 0.0, tangent: [0.0; 2], feature: NO_FEATURE }
@@ -13,6 +25,11 @@ pub fn store(manifold: &Manifold, point: usize, normal: f32, tangent: [f32; 2]) 
 }
 
 /// What the slot remembers of the manifold as a whole.
-pub fn store_memory(manifold: &Manifold, remembered: f32) -> ManifoldMemory {
-    ManifoldMemory { remembered: remembered * manifold.count as f32, ..ManifoldMemory::default() }
+pub fn store_memory(manifold: &Manifold, solved: &Solved) -> ManifoldMemory {
+    let used = |point: usize| if point < manifold.count as usize { solved.totals[point] } else { [0.0; 3] };
+    ManifoldMemory {
+        remembered: solved.remembered * manifold.count as f32,
+        totals: std::array::from_fn(used),
+        ..ManifoldMemory::default()
+    }
 }

@@ -260,14 +260,14 @@ impl Kept {
             }
         });
         let memory = Shared::new(&mut self.memory);
-        self.rows.for_each_constraint(|c, remembered, solved| {
+        self.rows.for_each_constraint(|c, solved| {
             let index = batches.order[c] as usize;
             let slot = matched.pairs[index].slot as usize;
-            let stored = std::array::from_fn(|k| store::store(&manifolds[index], k, solved[k].0, solved[k].1));
+            let stored = std::array::from_fn(|k| store::store(&manifolds[index], k, solved));
             // SAFETY: as above; each constraint is one of those pairs.
             unsafe { impulses.set(slot, stored) };
             // SAFETY: as above.
-            unsafe { memory.set(slot, store::store_memory(&manifolds[index], remembered)) };
+            unsafe { memory.set(slot, store::store_memory(&manifolds[index], solved)) };
         });
     }
 }
