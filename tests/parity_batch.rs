@@ -17,9 +17,9 @@ use tumble_gpu::primitives::{Count, Sort, SortOptions};
 use tumble_gpu::recorder::split;
 
 const PERMUTATIONS: [u32; 3] = [0, 1, 2];
-/// Words of `Control` that the passes use: the number of pairs, and whether the next step colours anew.
+/// Words of `Control` that the passes use: the number of pairs, and what the next step may keep.
 const PAIR_COUNT: u32 = 8;
-const RECOLOR_NEXT: usize = 31;
+const NEXT_COLORED_AS: usize = 31;
 
 /// What batching reads.
 struct Graph {
@@ -84,12 +84,12 @@ impl Graph {
         let mut step = Params::default().step_params(1, tumble_core::glam::Vec3::ZERO);
         (step.body_count, step.collider_count, step.pair_capacity) = (bodies, bodies, pairs);
         step.wide_batches = 16;
-        let control = Control { pair_count: pairs, ..Control::zeroed() };
+        let control = Control { pair_count: pairs, colored_as: step.batching, ..Control::zeroed() };
         Self { pairs: list, manifolds, aabbs: (0..bodies).map(aabb).collect(), ends, kept, control, step }
     }
 
     fn on_cpu(&self) -> Batches {
-        let (recolor, bodies) = (self.control.recolor != 0, self.step.body_count as usize);
+        let (recolor, bodies) = (self.control.colored_as != self.step.batching, self.step.body_count as usize);
         batch::place(&self.pairs, &self.manifolds, &self.ends, &self.kept, recolor, bodies, &self.step)
     }
 
@@ -115,16 +115,19 @@ impl Graph {
         let (by_pair, by_body) = ((pairs as u32).div_ceil(256) + 1, (bodies as u32).div_ceil(256) + 1);
         alone.run(|chain| {
             chain.pass("batch", "begin", by_pair);
-            for round in 0..limits::WIDE_ROUNDS {
+            for round in 0..limits::wide_rounds(self.step.batching) {
                 chain.indexed("batch", "bid", ("round", round), by_pair);
                 chain.indexed("batch", "place", ("round", round), by_pair);
             }
             chain.pass("batch", "compact", by_pair);
+            if self.step.batching & batching::LAW == batching::WRITE_AND_VERIFY {
+                chain.pass("batch", "unclaim", by_body);
+            }
             chain.pass("batch", "tail", 1);
             chain.pass("batch", "finish", by_pair);
             chain.pass("batch", "degree", by_body);
             sort.record(&mut chain.recorder, &keys, &values, Some(&counts)).unwrap();
-            chain.pass("batch", "table", by_pair);
+            chain.pass("batch", "table", 1);
             chain.pass("batch", "gate", 1);
         });
         let words: Vec<u32> = alone.take("masks");
@@ -146,12 +149,12 @@ impl Graph {
         assert_eq!(gpu.control.batch_start[..65], cpu.start, "{what}");
         assert!(gpu.order[..constraints] == cpu.order, "{what}: order");
         let last_count = cpu.start[64] - cpu.start[63];
-        let recolor = u32::from(batch::wasteful(cpu.batch_count, cpu.max_degree));
+        let colored_as = batch::colored_as(&cpu, self.step.batching);
         let told = |c: &Control| [c.rounds, c.batch_count, c.max_degree, c.last_count, c.solved, c.unplaced];
         let (rounds, batch_count, max_degree) = (cpu.rounds, cpu.batch_count, cpu.max_degree);
         let expected = [rounds, batch_count, max_degree, last_count, constraints as u32, 0];
         assert_eq!(told(&gpu.control), expected, "{what}: rounds, batches, degree, last, solved, unplaced");
-        assert_eq!(bytemuck::cast_ref::<_, [u32; 112]>(&gpu.control)[RECOLOR_NEXT], recolor, "{what}");
+        assert_eq!(bytemuck::cast_ref::<_, [u32; 112]>(&gpu.control)[NEXT_COLORED_AS], colored_as, "{what}");
         let stop = last_count > self.step.last_limit;
         let raised = [gpu.control.stop, gpu.control.overflow, gpu.control.needed];
         assert_eq!(raised, if stop { [1, overflow::LAST_BATCH, last_count] } else { [0; 3] }, "{what}");
@@ -264,8 +267,8 @@ fn waste_asks_for_new_colours() {
     graph.kept = vec![20, 40];
     let alone = &mut Alone::new(0);
     let cpu = graph.check("kept", alone);
-    assert!(batch::wasteful(cpu.batch_count, cpu.max_degree));
-    graph.control.recolor = 1;
+    assert!(batch::wasteful(&cpu, graph.step.batching));
+    graph.control.colored_as = 0;
     let cpu = graph.check("anew", alone);
     assert_eq!(cpu.batch_count, 1);
 }

@@ -1,5 +1,12 @@
 // What one step is told, as a uniform. Fields and units: crates/core/src/layout/step.rs.
 
+// `batching`: a law, and flags.
+const BATCHING_WRITE_AND_VERIFY: u32 = 1u;
+const BATCHING_LOWEST_FREE: u32 = 2u;
+const BATCHING_PERSISTENT: u32 = 3u;
+const BATCHING_LAW: u32 = 3u;
+const BATCHING_STATIC_LAST: u32 = 4u;
+
 struct StepParams {
     dt: f32,
     h: f32,
@@ -27,4 +34,8 @@ struct StepParams {
     static_bias_rate: f32,
     static_mass_scale: f32,
     static_impulse_scale: f32,
+    batching: u32,
+    pad_a: u32,
+    pad_b: u32,
+    pad_c: u32,
 }

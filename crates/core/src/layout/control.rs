@@ -44,8 +44,9 @@ pub struct Control {
     pub old_pair_count: u32,
     /// Slots on the free list.
     pub free_count: u32,
-    /// 1 when the next step colours everything anew.
-    pub recolor: u32,
+    /// What the kept batches are good for: `StepParams::batching` of the steps that may keep them. A step with another
+    /// one colours everything anew, and so does every step after 0.
+    pub colored_as: u32,
     /// Bodies in quarantine, all told.
     pub frozen_count: u32,
 

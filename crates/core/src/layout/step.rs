@@ -1,6 +1,6 @@
 use bytemuck::{Pod, Zeroable};
 
-/// What one step is told, as a uniform. 112 bytes.
+/// What one step is told, as a uniform. 128 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct StepParams {
@@ -56,4 +56,26 @@ pub struct StepParams {
     pub static_mass_scale: f32,
     /// `impulse_scale` of those.
     pub static_impulse_scale: f32,
+    /// How constraints are put into batches, see [`batching`].
+    pub batching: u32,
+    /// Unused.
+    pub pad_a: u32,
+    /// Unused.
+    pub pad_b: u32,
+    /// Unused.
+    pub pad_c: u32,
+}
+
+/// Words of [`StepParams::batching`]: a law, and flags.
+pub mod batching {
+    /// Batch after batch, anew each step.
+    pub const WRITE_AND_VERIFY: u32 = 1;
+    /// The lowest batch that both bodies are free in, anew each step.
+    pub const LOWEST_FREE: u32 = 2;
+    /// The same, kept from step to step.
+    pub const PERSISTENT: u32 = 3;
+    /// Bits of the law.
+    pub const LAW: u32 = 3;
+    /// Flag: contacts with what does not move take the highest free batch, not the lowest.
+    pub const STATIC_LAST: u32 = 4;
 }
