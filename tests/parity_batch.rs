@@ -325,10 +325,11 @@ fn random_graphs_are_batched_alike() {
                 let cut = cpu.rounds < limits::batch_rounds(way) && cpu.start[63] < cpu.start[64];
                 assert_eq!(pairs == 200_000, cut, "{what}");
                 // And again, from the batches that those now have.
-                graph.kept = cpu.of_pair.clone();
-                let again = graph.check(&format!("{what}, kept"), alone);
-                if way & batching::LAW != batching::PERSISTENT {
-                    assert!(again.of_pair == cpu.of_pair, "{what}: nothing is kept");
+                let persists = way & batching::LAW == batching::PERSISTENT;
+                if persists || pairs < 10_000 {
+                    graph.kept = cpu.of_pair.clone();
+                    let again = graph.check(&format!("{what}, kept"), alone);
+                    assert!(persists || again.of_pair == cpu.of_pair, "{what}: nothing is kept");
                 }
             }
         }
@@ -340,7 +341,7 @@ fn few_rounds_and_a_full_last_batch_stop_the_step() {
     let mut alones = PERMUTATIONS.map(Alone::new);
     for (rounds, last_limit) in [(0, u32::MAX), (1, u32::MAX), (8, 100_000), (60, 100_000), (62, 100)] {
         for (permute, alone) in alones.iter_mut().enumerate() {
-            for way in WAYS {
+            for &way in &WAYS[2 * permute..][..2] {
                 let mut graph = Graph::random(100, 20_000, 3).way(way, false);
                 graph.step.batch_rounds = rounds;
                 graph.step.last_limit = last_limit;

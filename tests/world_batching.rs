@@ -56,3 +56,24 @@ fn ways_may_change_between_steps() {
     }
     assert_eq!(seen[0], seen[1]);
 }
+
+/// More rounds than fit one kind of dispatch, and claims cleared between: the same on both sides.
+#[test]
+fn hubs_are_batched_alike_in_every_way() {
+    let scene = scenes::hub(150);
+    for batching in [Batching::WriteAndVerify, Batching::LowestFree, Batching::Persistent] {
+        for static_contacts_last in [false, true] {
+            let params = Params { batching, static_contacts_last, ..Params::default() };
+            let cpu = cpu::World::new(scene.clone(), params).unwrap();
+            let gpu = gpu::World::with_gpu(common::gpu().clone(), scene.clone(), params).unwrap();
+            let worlds = [World::Cpu(Box::new(cpu)), World::Gpu(Box::new(gpu))];
+            let [on_cpu, on_gpu] = worlds.map(|mut world| {
+                world.step().unwrap();
+                let report = world.sync().unwrap();
+                assert!(report.last_batch > 80, "{report}");
+                (report.batches, report.batch_rounds, report.last_batch, batches(&mut world))
+            });
+            assert_eq!(on_cpu, on_gpu, "{batching}, static last: {static_contacts_last}");
+        }
+    }
+}
