@@ -2,9 +2,10 @@
 //!
 //! Standard scenes after 60 steps, on both sides: batches, rounds, constraints in the last batch, milliseconds of the
 //! stages `batch` and `solver`, dispatches a step. All worlds of a scene and a side live at once and step by turns, so
-//! that a noisy machine harms all alike; times are lower quartiles, and told as ratios to the default's too. `persistent, unfused` gives every
-//! batch a dispatch of its own. Beside them the scheme of the talk as it was, with timing played by random numbers; see
-//! `raw.rs`. Then what the order of the batches does to the errors of a few cases of `speed_vs_error`, on the CPU.
+//! that a noisy machine harms all alike; times are lower quartiles, and told as ratios to the default's too.
+//! `persistent, unfused` gives every batch a dispatch of its own. Beside them the scheme of the talk as it was, with
+//! timing played by random numbers; see `raw.rs`. Then what the order of the batches does to the errors of a few cases
+//! of `speed_vs_error`, on the CPU.
 //!
 //! `--quick` runs one small iteration of everything, as a test; `--only TEXT` takes the scenes and cases whose name
 //! holds the text; `--no-gpu` leaves out the GPU; `--csv FILE` writes the table.
@@ -158,7 +159,8 @@ fn compare(name: &str, scene: &Scene, device: Option<&gpu::Gpu>, settings: &Sett
     }
     println!("{name}, {side}:");
     println!(
-        "  way                            batches  rounds  last  constraints  dispatches  batch ms   ratio  solver ms   ratio"
+        "  {:<30} {:>7} {:>7} {:>5} {:>12} {:>11} {:>9} {:>7} {:>10} {:>7}",
+        "way", "batches", "rounds", "last", "constraints", "dispatches", "batch ms", "ratio", "solver ms", "ratio"
     );
     let mut base = None;
     let mut all = Vec::new();

@@ -1,8 +1,9 @@
 // The graph of constraints and the batches that bodies are in: what a round of stage `batch` does to them.
 // Twin of crates/cpu/src/batch.rs.
 //
-// Passes hand over `batching`, of the step. Reads next_pairs and, for which body a collider is on and whether that moves, the boxes in aabbs; reads and writes
-// pair_batch (a batch a pair), masks (a bit a batch, two words a body) and claims (one a body).
+// Passes hand over `batching`, of the step. Reads next_pairs and, for which body a collider is on and whether that
+// moves, the boxes in aabbs; reads and writes pair_batch (a batch a pair), masks (a bit a batch, two words a body) and
+// claims (one a body).
 
 //#import shared/collider.wgsl
 //#import shared/control.wgsl
