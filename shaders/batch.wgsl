@@ -21,7 +21,7 @@
 //   finish     one thread a pair: who still waits joins the last batch; batch_keys and batch_order, to be sorted
 //   degree     one thread a body: how many batches it is in, from masks
 //   (primitives/sort of batch_keys with batch_order)
-//   table      one thread a batch: its first constraint, from batch_keys; batches that nobody is in come behind the others
+//   table      one thread a batch: its first constraint, from batch_keys; those that nobody is in come behind the others
 //   gate       one workgroup: what the step reports, whether it may go on, and dispatch_args for the solver
 //
 // All count in `counters`. What the rounds do to the graph is in shared/graph.wgsl.

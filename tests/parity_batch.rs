@@ -193,8 +193,8 @@ impl Graph {
     }
 
     /// Who keeps a batch stays there. Of those that took the lowest free batch, no lower one is free at the end, since
-    /// batches only fill; nor a higher one, of those that come last. And no batch of write-and-verify is empty, since of
-    /// all that wait the lowest hash wins.
+    /// batches only fill; nor a higher one, of those that come last. And no batch of write-and-verify is empty, since
+    /// of all that wait the lowest hash wins.
     fn check_promises(&self, what: &str, cpu: &Batches) {
         let persists = self.control.colored_as == self.step.batching && self.law() == batching::PERSISTENT;
         let static_last = self.step.batching & batching::STATIC_LAST != 0;

@@ -1,6 +1,6 @@
-//! Write and verify as in the talk (Harada, "Parallelizing the Physics Pipeline", GDC 2009), where of those who write to
-//! a body at once the last one wins: timing decides, here played by random numbers. It shows what the deterministic form
-//! costs and what it saves; the product has no such pass.
+//! Write and verify as in the talk (Harada, "Parallelizing the Physics Pipeline", GDC 2009), where of those who write
+//! to a body at once the last one wins: timing decides, here played by random numbers. It shows what the deterministic
+//! form costs and what it saves; the product has no such pass. There are as many batches here as it takes.
 
 use tumble::{RigidBodyType, cpu};
 use tumble_core::limits::TRIES;

@@ -35,8 +35,8 @@ pub struct Batches {
     pub of_pair: Vec<u32>,
     /// Pair of each constraint, batch by batch, in pair order within one.
     pub order: Vec<u32>,
-    /// First constraint of each batch, and the end. Here batches that nobody is in come behind the others, but before the
-    /// last one.
+    /// First constraint of each batch, and the end. Here batches that nobody is in come behind the others, but before
+    /// the last one.
     pub start: Vec<u32>,
     /// Batches that each body is in.
     pub masks: Vec<u64>,
