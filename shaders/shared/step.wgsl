@@ -7,6 +7,9 @@ const BATCHING_PERSISTENT: u32 = 3u;
 const BATCHING_LAW: u32 = 3u;
 const BATCHING_STATIC_LAST: u32 = 4u;
 
+const SOLVER_ONE_PASS: u32 = 0u;
+const SOLVER_SOFT: u32 = 1u;
+
 struct StepParams {
     dt: f32,
     h: f32,
@@ -34,8 +37,12 @@ struct StepParams {
     static_bias_rate: f32,
     static_mass_scale: f32,
     static_impulse_scale: f32,
+    memory_gain: f32,
+    memory_limit: f32,
+    memory_band: f32,
+    blow_speed: f32,
+    solver: u32,
     batching: u32,
     pad_a: u32,
     pad_b: u32,
-    pad_c: u32,
 }
