@@ -13,7 +13,7 @@
 mod raw;
 
 use std::fmt::Write;
-use tumble::{Batching, Params, Scene, World, cpu, gpu};
+use tumble::{Batching, OnePass, Params, Scene, Soft, Solver, World, cpu, gpu};
 use tumble_bench::cases;
 use tumble_bench::run::quantile;
 use tumble_core::scenes;
@@ -229,11 +229,12 @@ fn raw(name: &str, scene: &Scene, settings: &Settings) -> Vec<Row> {
     rows(name, "simulated", "last writer wins", &values)
 }
 
-/// What a way leaves of a case, on the CPU, with 4 sub-steps.
-fn errors(case: &cases::Case, quick: bool) -> Vec<Row> {
-    let params = Params::default();
+/// What a way leaves of a case, on the CPU.
+fn errors(case: &cases::Case, solver: Solver, substeps: u32, quick: bool) -> Vec<Row> {
+    let params = Params { solver, substeps, ..Params::default() };
+    let name = format!("{}, {solver}, {substeps} sub-steps", case.name);
     let steps = if quick { 2 } else { (case.seconds / f64::from(params.dt)).round() as usize };
-    println!("{}, cpu, errors after {steps} steps, mean of {} seeds:", case.name, case.seeds);
+    println!("{name}, cpu, errors after {steps} steps, mean of {} seeds:", case.seeds);
     let mut all = Vec::new();
     for way in WAYS.iter().filter(|way| way.fused) {
         // Of the seeds, where chaos makes one run say little: the mean.
@@ -241,7 +242,8 @@ fn errors(case: &cases::Case, quick: bool) -> Vec<Row> {
         let mut fell = false;
         for seed in 0..case.seeds {
             let scene = (case.scene)(seed);
-            let mut world = cpu::World::new(scene.clone(), way.params()).expect("the scene is valid");
+            let params = Params { solver, substeps, ..way.params() };
+            let mut world = cpu::World::new(scene.clone(), params).expect("the scene is valid");
             (0..steps).for_each(|_| world.step().expect("step"));
             let poses = world.poses().expect("poses");
             let velocities = world.velocities().expect("velocities");
@@ -257,7 +259,7 @@ fn errors(case: &cases::Case, quick: bool) -> Vec<Row> {
             write!(told, "  {name} {value:.3e} {unit}").expect("a string has room");
         }
         println!("  {:<30}{told}{}", way.name(), if fell { "  FELL" } else { "" });
-        all.extend(rows(case.name, "cpu", &way.name(), &values));
+        all.extend(rows(&name, "cpu", &way.name(), &values));
     }
     all
 }
@@ -265,7 +267,7 @@ fn errors(case: &cases::Case, quick: bool) -> Vec<Row> {
 fn csv(rows: &[Row]) -> String {
     let mut text = String::from("case,side,way,quantity,unit,value\n");
     for Row { case, side, way, quantity, unit, value } in rows {
-        writeln!(text, "{case},{side},\"{way}\",{quantity},{unit},{value:.6e}").expect("a string has room");
+        writeln!(text, "\"{case}\",{side},\"{way}\",{quantity},{unit},{value:.6e}").expect("a string has room");
     }
     text
 }
@@ -281,12 +283,13 @@ fn main() {
     let wanted = |name: &str| after("--only").is_none_or(|text| name.contains(text));
     let settings = match quick {
         true => Settings { warm_up: 1, rounds: 1, steps_a_round: 1 },
-        false => Settings { warm_up: 60, rounds: 10, steps_a_round: 3 },
+        false => Settings { warm_up: 60, rounds: 6, steps_a_round: 3 },
     };
     let device = (!has("--no-gpu")).then(|| gpu::Gpu::any().expect("an adapter"));
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let Params { solver, substeps, .. } = Params::default();
     println!(
-        "{threads} threads, dt 1/60 s, 4 sub-steps, {} warm-up steps; ratios are to the default's",
+        "{threads} threads, dt 1/60 s, {substeps} sub-steps, {solver}, {} warm-up steps; ratios are to the default's",
         settings.warm_up
     );
     if let Some(device) = &device {
@@ -311,7 +314,8 @@ fn main() {
         all.extend(raw(name, scene, &settings));
     }
     for case in cases::ALL.iter().filter(|case| CASES.contains(&case.name) && wanted(case.name)) {
-        all.extend(errors(case, quick));
+        all.extend(errors(case, Solver::OnePass(OnePass::default()), substeps, quick));
+        all.extend(errors(case, Solver::Soft(Soft::default()), 4, quick));
     }
     if let Some(file) = after("--csv") {
         std::fs::write(file, csv(&all)).unwrap_or_else(|error| panic!("{file} cannot be written: {error}"));
