@@ -84,7 +84,7 @@ fn wanted(at: Ends, round_index: u32, batching: u32) -> u32 {
     if verifies(batching) {
         let filling = round_index / TRIES;
         let batch = select(filling, LAST_BATCH - 1u - filling, from_above);
-        let is_free = (taken(at, batch / 32u) >> (batch % 32u) & 1u) == 0u;
+        let is_free = ((taken(at, batch / 32u) >> (batch % 32u)) & 1u) == 0u;
         return select(UNBATCHED, batch, is_free);
     }
     let low = ~taken(at, 0u);
