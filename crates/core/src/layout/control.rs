@@ -62,7 +62,7 @@ pub struct Control {
     pub constraint_count: u32,
     /// Contact points.
     pub point_count: u32,
-    /// Batches in use: one more than the highest, the last one excluded.
+    /// Batches in use, the last one excluded.
     pub batch_count: u32,
     /// Rounds that placing took.
     pub rounds: u32,
@@ -93,7 +93,8 @@ pub struct Control {
     /// Unused.
     pub pad_a: u32,
 
-    /// First constraint of each batch; the one after the last is the number of all.
+    /// First constraint of each batch in use, in their order, then those in no use, then the last one; behind it the
+    /// number of all.
     pub batch_start: [u32; 68],
     /// Slots of bodies newly quarantined in this step, plus one; zero where there is none.
     pub quarantined: [u32; QUARANTINE_NAMES],
