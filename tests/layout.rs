@@ -95,7 +95,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         Impulse { normal, tangent, feature }
         ManifoldMemory { remembered, pad_a, pad_b, pad_c, totals }
         Control {
-            stop, overflow, needed, step, old_pair_count, free_count, recolor, frozen_count, pair_count, processed,
+            stop, overflow, needed, step, old_pair_count, free_count, colored_as, frozen_count, pair_count, processed,
             new_count, dead_count, constraint_count, point_count, batch_count, rounds, unplaced, last_count,
             large_count, max_degree, solved, turns, cell_class, cell_bits, center_min, inverse_cell, center_max,
             pad_a, batch_start, quarantined, pad_b
@@ -115,7 +115,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             speculative_distance, restitution_threshold, body_count, collider_count, pair_capacity, cell_table_bits,
             large_limit, edit_ranges, drop_pair, write_poses, batch_rounds, last_limit, wide_batches,
             static_bias_rate, static_mass_scale, static_impulse_scale, memory_gain, memory_limit,
-            memory_band, blow_speed, solver, pad_a, pad_b, pad_c
+            memory_band, blow_speed, solver, batching, pad_a, pad_b
         }
     })
 }
@@ -147,6 +147,7 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
         }
         query_word as "QUERY_" { UNBOUNDED, TURNS, TOTAL, COUNT }
         tree_members as "MEMBERS_" { MOVING, FIXED, LARGE, ALL }
+        batching as "BATCHING_" { WRITE_AND_VERIFY, LOWEST_FREE, PERSISTENT, LAW, STATIC_LAST }
         ;
         BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT, NO_NODE, NO_COLLIDER
     }

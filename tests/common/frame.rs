@@ -216,7 +216,8 @@ impl Cpu {
 
 /// A control block with what the passes after the narrow phase read.
 pub(crate) fn control_of(frame: &Frame, recolor: bool) -> Control {
-    let mut control = Control { recolor: recolor.into(), ..Control::zeroed() };
+    let colored_as = if recolor { 0 } else { frame.step.batching };
+    let mut control = Control { colored_as, ..Control::zeroed() };
     control.pair_count = frame.matched.pairs.len() as u32;
     control.new_count = frame.matched.new_count;
     control.dead_count = frame.matched.dead_slots.len() as u32;

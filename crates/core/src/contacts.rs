@@ -35,7 +35,8 @@ pub struct Contact {
     pub body_b: BodyHandle,
     /// From the first to the second, unit, world axes: along it the step pushed.
     pub normal: Vec3,
-    /// The batch that it was solved in; [`LAST_BATCH`](crate::layout::LAST_BATCH) is the one that is solved in sequence.
+    /// The batch that it was solved in. Batches are solved in the order of their numbers, some of which may be in no
+    /// use; [`LAST_BATCH`](crate::layout::LAST_BATCH) is the one that is solved in sequence.
     pub batch: u32,
     points: [ContactPoint; 4],
     count: u32,

@@ -104,7 +104,7 @@ impl Kept {
         watch: &mut Stopwatch,
     ) -> std::result::Result<Planned, Overflow> {
         let run = watch.begin("edit");
-        let mut control = Control { step: step.step, recolor: self.control.recolor, ..Control::zeroed() };
+        let mut control = Control { step: step.step, colored_as: self.control.colored_as, ..Control::zeroed() };
         let states = self.edit(asked.edits, step);
         let states = self.quarantine(states, &mut control);
         let run = watch.next(run, "bounds");
@@ -149,12 +149,12 @@ impl Kept {
         let run = watch.next(run, "batch");
         let body_of = |collider: u32| self.colliders[collider as usize].body;
         let ends: Vec<_> = matched.pairs.iter().map(|p| batch::ends(p, &body_of, &states)).collect();
-        let recolor = self.control.recolor != 0;
+        let recolor = self.control.colored_as != step.batching;
         let batches = batch::place(&matched.pairs, &manifolds, &ends, &self.batch_of_slot, recolor, states.len(), step);
         control.rounds = batches.rounds;
         control.batch_count = batches.batch_count;
         control.max_degree = batches.max_degree;
-        control.recolor = u32::from(batch::wasteful(batches.batch_count, batches.max_degree));
+        control.colored_as = batch::colored_as(&batches, step.batching);
         control.batch_start[..batches.start.len()].copy_from_slice(&batches.start);
         control.last_count = batches.order.len() as u32 - batches.start[batches.start.len() - 2];
         control.solved = batches.order.len() as u32;

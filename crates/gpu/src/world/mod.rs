@@ -24,7 +24,7 @@ use tumble_core::{Editor, Params, Poses, Result, Scene, StageRun, StageTime, Ste
 const IN_FLIGHT: usize = 3;
 /// Batches with a dispatch of their own as long as no report has told how many there are.
 const WIDE_BATCHES: u32 = 24;
-/// Constraints from which on a batch is worth a dispatch; those behind the last such batch share a workgroup.
+/// Constraints from which on a batch is worth a dispatch at first; those behind the last such batch share a workgroup.
 const WIDE: u32 = 256;
 
 /// A simulation on a GPU.
@@ -61,6 +61,10 @@ pub struct World {
     most_pairs: u32,
     /// Batches that were worth a dispatch in the step of this number, for the last few.
     batches: VecDeque<(u32, u32)>,
+    /// Constraints from which on a batch is worth one.
+    wide: u32,
+    /// Dispatches that the last submission recorded.
+    dispatches: u32,
     /// How far colliders lay apart in the step of this number.
     extent: Option<(u32, Vec3)>,
     device_runs: Vec<StageRun>,
@@ -139,6 +143,8 @@ impl World {
             last_step: StepParams::zeroed(),
             most_pairs: 0,
             batches: VecDeque::new(),
+            wide: WIDE,
+            dispatches: 0,
             extent: None,
             device_runs: Vec::new(),
             watch: Stopwatch::default(),
@@ -217,6 +223,19 @@ impl World {
     #[doc(hidden)]
     pub fn drop_pair(&mut self, index: u32) {
         self.drop_pair = index;
+    }
+
+    /// For benches: batches of fewer constraints share one dispatch, if no larger one comes behind them. Results do not
+    /// change.
+    #[doc(hidden)]
+    pub fn fuse_below(&mut self, constraints: u32) {
+        self.wide = constraints;
+    }
+
+    /// For benches: dispatches that the last step recorded.
+    #[doc(hidden)]
+    pub fn dispatches(&self) -> u32 {
+        self.dispatches
     }
 
     /// Submits one step. Waits only when three are in flight.
@@ -302,6 +321,7 @@ impl World {
         let mut recorder = Recorder::new(&self.gpu, &self.buffers, &mut self.cache, timer);
         self.stages.record(&mut recorder, &self.buffers, &record.step)?;
         self.statuses.copy(recorder.encoder(), self.buffers.buffer("control")?, 0);
+        self.dispatches = recorder.dispatches();
         let run = self.watch.next(run, "submit");
         let index = recorder.submit()?;
         self.watch.end(run);
@@ -341,7 +361,7 @@ impl World {
                     self.extent = Some((status.step, extent_of(&status)));
                 }
                 self.stages.broadphase.walked(record.step.step, status.turns);
-                self.batches.push_back((record.step.step, wide_batches(&status)));
+                self.batches.push_back((record.step.step, wide_batches(&status, self.wide)));
                 self.last_step = record.step;
                 self.most_pairs = self.most_pairs.max(status.old_pair_count);
                 if self.batches.len() > 2 * IN_FLIGHT {
@@ -362,10 +382,10 @@ impl World {
 }
 
 /// How many of the first batches have a dispatch of their own: up to the last that is worth one.
-fn wide_batches(status: &Control) -> u32 {
+fn wide_batches(status: &Control, wide: u32) -> u32 {
     let worth = |batch: &u32| {
         let first = *batch as usize;
-        status.batch_start[first + 1].saturating_sub(status.batch_start[first]) >= WIDE
+        status.batch_start[first + 1].saturating_sub(status.batch_start[first]) >= wide
     };
     (0..LAST_BATCH).rev().find(worth).map_or(0, |batch| batch + 1)
 }
