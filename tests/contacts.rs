@@ -90,8 +90,8 @@ fn a_column_weighs_what_it_weighs() {
                 let weight: f32 = boxes[i..].iter().map(|body| mass(&scene, *body) * G).sum();
                 let force: f32 = contact.points().iter().map(|p| p.normal_impulse / contacts.dt).sum();
                 worst = worst.max((force / weight - 1.0).abs());
-                // What is remembered leaves no overlap, but for the last bit.
-                assert!(contact.points().iter().all(|p| p.separation.abs() <= 1e-6 || substeps == 1), "{contact:?}");
+                // What is remembered leaves no overlap, but for 1.4e-6 m (six units in the last place of 3 m).
+                assert!(contact.points().iter().all(|p| p.separation.abs() <= 3e-6 || substeps == 1), "{contact:?}");
             }
             eprintln!("{side:?}, {substeps} sub-steps: off by {worst:e} of the weight");
             assert!(worst <= 5e-5, "{side:?}, {substeps} sub-steps: {worst:e}");
