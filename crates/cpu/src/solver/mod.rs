@@ -7,6 +7,7 @@
 //! contacts solved again as rigid, which takes out the velocity that the springs put in. Bounces come last.
 
 mod lanes;
+mod passes;
 pub mod prepare;
 mod prepare_lanes;
 pub mod soft;
@@ -14,8 +15,7 @@ mod soft_lanes;
 pub mod store;
 
 use crate::motion;
-use crate::shared::Shared;
-use lanes::{BodyLanes, ConstraintLanes, LANES};
+use lanes::{ConstraintLanes, LANES};
 use prepare::Contact;
 use rayon::prelude::*;
 use tumble_core::layout::{
@@ -131,30 +131,6 @@ impl Rows {
     pub(crate) fn bytes(&self) -> u64 {
         (self.groups.capacity() * (size_of::<ConstraintLanes>() + 8)) as u64
     }
-
-    fn sweep(&mut self, bodies: &mut [SolverBody], step: &StepParams, visit: Visit) {
-        for batch in 0..LAST_BATCH as usize {
-            let groups = &mut self.groups[self.group_start[batch]..self.group_start[batch + 1]];
-            if groups.is_empty() {
-                continue;
-            }
-            let shared = Shared::new(bytemuck::cast_slice_mut::<SolverBody, f32x4>(bodies));
-            let moved = matches!(visit, Visit::Solve | Visit::Relax);
-            groups.par_iter_mut().with_min_len(64).for_each(|group| {
-                // SAFETY: constraints of one batch share no moving body (`batch`), and bodies that do not move are
-                // never written (`scatter`).
-                let read = |i: usize| unsafe { shared.get(i) };
-                let mut a = BodyLanes::gather(read, group.body_a, moved);
-                let mut b = BodyLanes::gather(read, group.body_b, moved);
-                soft_lanes::visit(visit, group, &mut a, &mut b, step);
-                // SAFETY: as above.
-                unsafe { a.scatter(&shared, group.body_a) };
-                // SAFETY: as above.
-                unsafe { b.scatter(&shared, group.body_b) };
-            });
-        }
-        self.last.sweep(bodies, step, visit);
-    }
 }
 
 impl PlainRows {
@@ -187,30 +163,43 @@ impl PlainRows {
     }
 }
 
+/// One pass of a step's schedule.
+#[derive(Debug, Clone, Copy)]
+enum Pass {
+    /// Over all bodies.
+    Bodies(fn(&mut SolverBody, &BodyState, &BodyProps, &StepParams)),
+    /// A visit to every constraint.
+    Sweep(Visit),
+}
+
+/// The passes of a step, in order.
+fn schedule(step: &StepParams, restitution: bool) -> Vec<Pass> {
+    let substep = [
+        Pass::Bodies(motion::integrate_velocity),
+        Pass::Sweep(Visit::WarmStart),
+        Pass::Sweep(Visit::Solve),
+        Pass::Bodies(motion::integrate_position),
+        Pass::Sweep(Visit::Relax),
+    ];
+    let mut passes = substep.repeat(step.substeps as usize);
+    if restitution {
+        passes.push(Pass::Sweep(Visit::Restitution));
+    }
+    passes
+}
+
 /// Runs all sub-steps.
 pub fn solve(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, restitution: bool) {
-    substeps(bodies, step, restitution, |bodies, visit| rows.sweep(bodies, step, visit));
+    passes::run(rows, bodies, step, &schedule(step, restitution));
 }
 
 /// The same in plain rows, one constraint after the other: what `solve` is tested against.
 pub fn solve_plain(rows: &mut PlainRows, bodies: Bodies<'_>, step: &StepParams, restitution: bool) {
-    substeps(bodies, step, restitution, |bodies, visit| rows.sweep(bodies, step, visit));
-}
-
-fn substeps(bodies: Bodies<'_>, step: &StepParams, restitution: bool, mut sweep: impl FnMut(&mut [SolverBody], Visit)) {
     let Bodies { solver, states, props } = bodies;
-    for _ in 0..step.substeps {
-        solver.par_iter_mut().zip(states.par_iter().zip(props)).with_min_len(512).for_each(|(body, (state, props))| {
-            motion::integrate_velocity(body, state, props, step);
-        });
-        sweep(solver, Visit::WarmStart);
-        sweep(solver, Visit::Solve);
-        solver.par_iter_mut().zip(states.par_iter().zip(props)).with_min_len(512).for_each(|(body, (state, props))| {
-            motion::integrate_position(body, state, props, step);
-        });
-        sweep(solver, Visit::Relax);
-    }
-    if restitution {
-        sweep(solver, Visit::Restitution);
+    for pass in schedule(step, restitution) {
+        match pass {
+            Pass::Bodies(each) => (0..solver.len()).for_each(|i| each(&mut solver[i], &states[i], &props[i], step)),
+            Pass::Sweep(visit) => rows.sweep(solver, step, visit),
+        }
     }
 }
