@@ -122,3 +122,59 @@ impl Drop for Alarm<'_> {
         self.0.store(true, Ordering::Relaxed);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{block_of, run_stages};
+    use crate::shared::Shared;
+
+    const BLOCKS: u32 = 61;
+    const STAGES: usize = 600;
+
+    /// What a block makes of its cell and those beside it, as they were after the stage before.
+    fn next(before: &[u64], block: usize) -> u64 {
+        let last = before.len() - 1;
+        let around = [before[block.saturating_sub(1)], before[block], before[(block + 1).min(last)]];
+        around.iter().fold(7, |sum: u64, cell| sum.rotate_left(9).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ cell)
+    }
+
+    fn run(threads: usize) -> Vec<u64> {
+        let mut cells = [vec![1; BLOCKS as usize], vec![2; BLOCKS as usize]];
+        // Stages of one block between the others, as batches are.
+        let blocks: Vec<u32> = (0..STAGES).map(|stage| if stage % 5 == 3 { 1 } else { BLOCKS }).collect();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let [a, b] = &mut cells;
+            let (a, b) = (Shared::new(a), Shared::new(b));
+            run_stages(&blocks, |stage, block| {
+                let (from, to) = if stage % 2 == 0 { (&a, &b) } else { (&b, &a) };
+                // SAFETY: a stage writes one buffer and reads the other.
+                let before: Vec<u64> = (0..BLOCKS as usize).map(|i| unsafe { from.get(i) }).collect();
+                for i in block_of(&(0..BLOCKS as usize), block, blocks[stage]) {
+                    // SAFETY: blocks of a stage have cells of their own.
+                    unsafe { to.set(i, next(&before, i)) };
+                }
+            });
+        });
+        cells.concat()
+    }
+
+    /// Oracle: one thread, which works off block after block.
+    #[test]
+    fn stages_wait_for_each_other() {
+        let alone = run(1);
+        for threads in [2, 3, 7] {
+            for _ in 0..20 {
+                assert_eq!(run(threads), alone, "{threads} threads");
+            }
+        }
+    }
+
+    /// Nobody waits for a block that will never be done.
+    #[test]
+    fn a_panic_goes_on_behind_the_section() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        let run = || pool.install(|| run_stages(&[8; 50], |stage, block| assert!((stage, block) != (20, 5))));
+        assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).is_err());
+    }
+}
