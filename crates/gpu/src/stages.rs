@@ -19,6 +19,8 @@ use tumble_core::{Plan, Result};
 pub(crate) struct Built {
     pub(crate) plan: Plan,
     pub(crate) choice: Choice,
+    /// `StepParams::solver`.
+    pub(crate) solver: u32,
 }
 
 /// Every stage that the plan needs, made for arrays of these sizes.
@@ -43,7 +45,7 @@ impl Stages {
             contact: Contact::new(gpu, pipelines, sizes)?,
             narrowphase: Narrowphase::new(gpu, pipelines, plan)?,
             batch: Batch::new(gpu, pipelines, sizes)?,
-            solver: Solver::new(gpu, pipelines, plan)?,
+            solver: Solver::new(gpu, pipelines, plan, built.solver)?,
             motion: Motion::new(gpu, pipelines)?,
         })
     }
@@ -68,7 +70,7 @@ impl Stages {
         self.narrowphase.record(recorder, self.contact.a_pair())?;
         self.batch.record(recorder, buffers, step, self.contact.a_pair())?;
 
-        self.solver.record(recorder, buffers, &self.motion, step)?;
+        self.solver.record(recorder, buffers, step)?;
         self.contact.record_commit(recorder, buffers)?;
         self.motion.record_commit(recorder, step)?;
         self.contact.record_counts(recorder)

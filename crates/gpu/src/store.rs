@@ -4,7 +4,7 @@ use crate::{Bind, Buffers, Gpu};
 use bytemuck::Zeroable;
 use tumble_core::layout::{
     Aabb, BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Control, EditRange, EditRecord,
-    FoundManifold, Impulse, Manifold, Pair, PoseRecord, SolverBody, StepParams,
+    FoundManifold, Impulse, Manifold, ManifoldMemory, Pair, PoseRecord, SolverBody, StepParams,
 };
 use tumble_core::{PackedScene, Result};
 use wgpu::BufferUsages;
@@ -56,7 +56,7 @@ enum Per {
 }
 
 /// Name, bytes of an element, what it follows, whether its content outlives a step.
-const ARRAYS: [(&str, usize, Per, bool); 29] = [
+const ARRAYS: [(&str, usize, Per, bool); 30] = [
     ("states", size_of::<BodyState>(), Per::Body, true),
     ("work_states", size_of::<BodyState>(), Per::Body, false),
     ("props", size_of::<BodyProps>(), Per::Body, true),
@@ -72,6 +72,7 @@ const ARRAYS: [(&str, usize, Per, bool); 29] = [
     ("free_slots", 4, Per::Pair, true),
     ("batch_of_slot", 4, Per::Pair, true),
     ("slot_impulses", 4 * size_of::<Impulse>(), Per::Pair, true),
+    ("slot_memory", size_of::<ManifoldMemory>(), Per::Pair, true),
     ("found_manifolds", size_of::<FoundManifold>(), Per::Pair, true),
     ("pair_keys", 8, Per::Pair, false),
     ("pair_values", 4, Per::Pair, false),

@@ -1,25 +1,39 @@
-//! Stage `solver`: rows (`prepare`), the law of one visit (`soft`; four at a time in `soft_lanes`), the passes over
-//! batches (here), and the way back to the store (`store`). Twin of `shaders/solver/`.
+//! Stage `solver`: rows (`prepare`), the laws of a visit (`one_pass` and `soft`, on `push`; four constraints at a time
+//! in those called `_lanes`), the passes over
+//! batches (`passes`; in plain form here), and the way back to the store (`store`). Twin of
+//! `shaders/solver/`.
 //!
-//! Soft sub-stepping, the shape that Box2D 3, Box3D and rapier converged on (Catto, "Solver2D", 2024; Macklin et al.,
-//! "Small Steps in Physics Simulation", SCA 2019): contacts are found once a step, and in each sub-step velocities
-//! are integrated, impulses of the last sub-step applied, contacts solved as damped springs, positions integrated, and
-//! contacts solved again as rigid, which takes out the velocity that the springs put in. Bounces come last.
+//! Contacts are found once a step and solved in sub-steps (Macklin et al., "Small Steps in Physics Simulation", SCA
+//! 2019), by one of these:
+//!
+//! - one pass: each sub-step predicts velocities by what the last one added to them, visits every contact once, and
+//!   integrates positions;
+//! - soft, the shape that Box2D 3, Box3D and rapier converged on (Catto, "Solver2D", 2024): in each sub-step velocities
+//!   are integrated, impulses of the last sub-step applied, contacts solved as damped springs, positions integrated, and
+//!   contacts solved again as rigid, which takes out the velocity that the springs put in.
+//!
+//! Bounces come last.
 
 mod lanes;
+pub mod one_pass;
+mod one_pass_lanes;
 mod passes;
 pub mod prepare;
 mod prepare_lanes;
-pub mod soft;
+mod push;
+mod push_lanes;
+mod soft;
 mod soft_lanes;
 pub mod store;
 
+use crate::math::tangents;
 use crate::motion;
 use lanes::{ConstraintLanes, LANES};
 use prepare::Contact;
 use rayon::prelude::*;
 use tumble_core::layout::{
     BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Impulse, LAST_BATCH, SolverBody, StepParams,
+    solver,
 };
 use wide::f32x4;
 
@@ -55,12 +69,16 @@ pub type PlainConstraint = (ConstraintHead, [ConstraintPoint; 4], [Impulse; 4]);
 /// What a visit to a constraint does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Visit {
-    /// Applies the impulses of the last visit.
+    /// Soft: applies the impulses of the last visit.
     WarmStart,
-    /// Soft.
+    /// Soft: as springs.
     Solve,
-    /// Rigid, no bias.
+    /// Soft: rigid, no bias.
     Relax,
+    /// One pass: applies the impulses of the last step.
+    Load,
+    /// One pass: all there is in a sub-step.
+    Pass,
     /// Bounces.
     Restitution,
 }
@@ -114,16 +132,18 @@ impl Rows {
         self.last = PlainRows::build(last, |c| prepare::prepare_constraint(&contact(c), colliders, bodies, step));
     }
 
-    /// Calls `take(c, impulses)` for every constraint, with (normal, tangent) of its four points, used or not; from many
-    /// threads at once.
-    pub fn for_each_constraint(&self, take: impl Fn(usize, [(f32, [f32; 2]); 4]) + Sync) {
+    /// Calls `take(c, remembered, impulses)` for every constraint, with (normal, tangent) of its four points, used or not;
+    /// from many threads at once.
+    pub fn for_each_constraint(&self, take: impl Fn(usize, f32, [(f32, [f32; 2]); 4]) + Sync) {
         self.groups.par_iter().zip(&self.members).with_min_len(64).for_each(|(group, &(first, count))| {
             for lane in 0..count as usize {
-                take(first as usize + lane, std::array::from_fn(|point| group.impulse(lane, point)));
+                let impulses = std::array::from_fn(|point| group.impulse(lane, point));
+                take(first as usize + lane, group.remembered(lane), impulses);
             }
         });
-        for (i, four) in self.last.impulses.chunks_exact(4).enumerate() {
-            take(self.last_first + i, std::array::from_fn(|point| (four[point].normal, four[point].tangent)));
+        for (i, (head, four)) in self.last.heads.iter().zip(self.last.impulses.chunks_exact(4)).enumerate() {
+            let impulses = std::array::from_fn(|point| (four[point].normal, four[point].tangent));
+            take(self.last_first + i, head.remembered, impulses);
         }
     }
 
@@ -149,10 +169,20 @@ impl PlainRows {
     /// One visit to every constraint, in order. Within a batch the order is of no account.
     pub fn sweep(&mut self, bodies: &mut [SolverBody], step: &StepParams, visit: Visit) {
         let points = self.points.chunks_exact_mut(4);
-        for (head, (points, impulses)) in self.heads.iter().zip(points.zip(self.impulses.chunks_exact_mut(4))) {
-            let (ia, ib) = (head.body_a as usize, head.body_b as usize);
+        for (head, (points, impulses)) in self.heads.iter_mut().zip(points.zip(self.impulses.chunks_exact_mut(4))) {
+            let (ia, ib, count) = (head.body_a as usize, head.body_b as usize, head.count as usize);
             let (mut a, mut b) = (bodies[ia], bodies[ib]);
-            soft::visit(visit, head, points, impulses, &mut a, &mut b, step);
+            let (points, impulses) = (&mut points[..count], &mut impulses[..count]);
+            let tangents = tangents(head.normal.into()).into();
+            match visit {
+                Visit::WarmStart => push::warm_start(head, tangents, points, impulses, &mut a, &mut b),
+                Visit::Solve | Visit::Relax => {
+                    soft::visit(visit, head, tangents, points, impulses, &mut a, &mut b, step);
+                }
+                Visit::Load => one_pass::load(head, tangents, points, impulses, &mut a, &mut b),
+                Visit::Pass => one_pass::pass(head, tangents, points, impulses, &mut a, &mut b, step),
+                Visit::Restitution => push::restitution(head, points, impulses, &mut a, &mut b, step),
+            }
             if a.inverse_mass > 0.0 {
                 bodies[ia] = a;
             }
@@ -167,28 +197,15 @@ impl PlainRows {
 #[derive(Debug, Clone, Copy)]
 enum Pass {
     /// Over all bodies.
-    Bodies(fn(&mut SolverBody, &BodyState, &BodyProps, &StepParams)),
+    Bodies(BodyPass),
     /// A visit to every constraint.
     Sweep(Visit),
 }
 
-/// The passes of a step, in order.
-fn schedule(step: &StepParams, restitution: bool) -> Vec<Pass> {
-    let substep = [
-        Pass::Bodies(motion::integrate_velocity),
-        Pass::Sweep(Visit::WarmStart),
-        Pass::Sweep(Visit::Solve),
-        Pass::Bodies(motion::integrate_position),
-        Pass::Sweep(Visit::Relax),
-    ];
-    let mut passes = substep.repeat(step.substeps as usize);
-    if restitution {
-        passes.push(Pass::Sweep(Visit::Restitution));
-    }
-    passes
-}
+/// What is done to each body.
+type BodyPass = fn(&mut SolverBody, &BodyState, &BodyProps, &StepParams);
 
-/// Runs all sub-steps.
+/// Runs all sub-steps, by the law of `step.solver`.
 pub fn solve(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, restitution: bool) {
     passes::run(rows, bodies, step, &schedule(step, restitution));
 }
@@ -202,4 +219,33 @@ pub fn solve_plain(rows: &mut PlainRows, bodies: Bodies<'_>, step: &StepParams, 
             Pass::Sweep(visit) => rows.sweep(solver, step, visit),
         }
     }
+}
+
+/// The passes of a step, in order.
+fn schedule(step: &StepParams, restitution: bool) -> Vec<Pass> {
+    let mut passes = Vec::new();
+    if step.solver == solver::SOFT {
+        for _ in 0..step.substeps {
+            passes.push(Pass::Bodies(motion::integrate_velocity));
+            passes.push(Pass::Sweep(Visit::WarmStart));
+            passes.push(Pass::Sweep(Visit::Solve));
+            passes.push(Pass::Bodies(motion::integrate_position));
+            passes.push(Pass::Sweep(Visit::Relax));
+        }
+    } else {
+        passes.push(Pass::Bodies(motion::first_substep));
+        passes.push(Pass::Sweep(Visit::Load));
+        for substep in 1..=step.substeps {
+            passes.push(Pass::Sweep(Visit::Pass));
+            passes.push(Pass::Bodies(if substep < step.substeps {
+                motion::next_substep
+            } else {
+                motion::last_substep
+            }));
+        }
+    }
+    if restitution {
+        passes.push(Pass::Sweep(Visit::Restitution));
+    }
+    passes
 }

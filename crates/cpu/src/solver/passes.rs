@@ -4,7 +4,7 @@
 //! are worked off as one block: handing each to the next thread costs more than it gives.
 
 use super::lanes::{BodyLanes, ConstraintLanes};
-use super::{Bodies, Pass, Rows, Visit, soft_lanes};
+use super::{Bodies, Pass, Rows, Visit, one_pass_lanes, soft_lanes};
 use crate::shared::Shared;
 use crate::workers::{block_of, blocks, run_stages};
 use std::ops::Range;
@@ -92,26 +92,48 @@ pub(super) fn run(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, passes
 fn sweep(groups: &mut [ConstraintLanes], bodies: &Shared<'_, f32x4>, step: &StepParams, visit: Visit) {
     // The visit is a constant in each of these loops.
     match visit {
-        Visit::WarmStart => sweep_by(Visit::WarmStart, groups, bodies, step),
-        Visit::Solve => sweep_by(Visit::Solve, groups, bodies, step),
-        Visit::Relax => sweep_by(Visit::Relax, groups, bodies, step),
-        Visit::Restitution => sweep_by(Visit::Restitution, groups, bodies, step),
+        Visit::WarmStart => groups.iter_mut().for_each(|group| visit_group(Visit::WarmStart, group, bodies, step)),
+        Visit::Solve => groups.iter_mut().for_each(|group| visit_group(Visit::Solve, group, bodies, step)),
+        Visit::Relax => groups.iter_mut().for_each(|group| visit_group(Visit::Relax, group, bodies, step)),
+        Visit::Load => groups.iter_mut().for_each(|group| visit_group(Visit::Load, group, bodies, step)),
+        Visit::Pass => groups.iter_mut().for_each(|group| visit_group(Visit::Pass, group, bodies, step)),
+        Visit::Restitution => groups.iter_mut().for_each(|group| visit_group(Visit::Restitution, group, bodies, step)),
     }
 }
 
 #[inline(always)]
-fn sweep_by(visit: Visit, groups: &mut [ConstraintLanes], bodies: &Shared<'_, f32x4>, step: &StepParams) {
-    let moved = matches!(visit, Visit::Solve | Visit::Relax);
-    for group in groups {
-        // SAFETY: no other thread moves these bodies meanwhile: constraints of one batch share none that moves, a part
-        // of several batches is one block, and bodies that do not move are never written (`scatter`).
-        let read = |i: usize| unsafe { bodies.get(i) };
-        let mut a = BodyLanes::gather(read, group.body_a, moved);
-        let mut b = BodyLanes::gather(read, group.body_b, moved);
-        soft_lanes::visit(visit, group, &mut a, &mut b, step);
-        // SAFETY: as above.
-        unsafe { a.scatter(bodies, group.body_a) };
-        // SAFETY: as above.
-        unsafe { b.scatter(bodies, group.body_b) };
+fn visit_group(visit: Visit, group: &mut ConstraintLanes, bodies: &Shared<'_, f32x4>, step: &StepParams) {
+    let moved = !matches!(visit, Visit::WarmStart | Visit::Restitution);
+    // SAFETY: no other thread moves these bodies meanwhile: constraints of one batch share none that moves, a part of
+    // several batches is one block, and bodies that do not move are never written (`scatter`).
+    let read = |i: usize| unsafe { bodies.get(i) };
+    let (ia, ib) = (group.head.body_a, group.head.body_b);
+    let mut a = BodyLanes::gather(read, ia, moved);
+    let mut b = BodyLanes::gather(read, ib, moved);
+    match visit {
+        Visit::WarmStart => group.warm_start(&mut a, &mut b),
+        Visit::Solve | Visit::Relax => soft_lanes::visit(visit, group, &mut a, &mut b, step),
+        Visit::Load => {
+            let [more_a, more_b] = one_pass_lanes::load(group, &mut a, &mut b);
+            // SAFETY: as above.
+            unsafe { a.weigh(bodies, ia, more_a) };
+            // SAFETY: as above.
+            unsafe { b.weigh(bodies, ib, more_b) };
+        }
+        Visit::Pass => {
+            let blows = one_pass_lanes::pass(group, &mut a, &mut b, step);
+            for (point, push) in blows.into_iter().enumerate().filter_map(|(k, push)| Some((k, push?))) {
+                let [ra, rb] = group.arms(point);
+                // SAFETY: as above.
+                unsafe { a.start_after(bodies, ia, -1.0, ra, push) };
+                // SAFETY: as above.
+                unsafe { b.start_after(bodies, ib, 1.0, rb, push) };
+            }
+        }
+        Visit::Restitution => group.bounce(&mut a, &mut b, step),
     }
+    // SAFETY: as above.
+    unsafe { a.scatter(bodies, ia) };
+    // SAFETY: as above.
+    unsafe { b.scatter(bodies, ib) };
 }

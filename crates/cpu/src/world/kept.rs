@@ -10,7 +10,7 @@ use bytemuck::Zeroable;
 use rayon::prelude::*;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{
-    Aabb, BodyProps, BodyState, Collider, Control, FoundManifold, Impulse, Manifold, Pair, PoseRecord,
+    Aabb, BodyProps, BodyState, Collider, Control, FoundManifold, Impulse, Manifold, ManifoldMemory, Pair, PoseRecord,
     QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, body_flags,
 };
 use tumble_core::stopwatch::Stopwatch;
@@ -28,6 +28,8 @@ pub(super) struct Kept {
     pub(super) batch_of_slot: Vec<u32>,
     /// Four a slot.
     pub(super) impulses: Vec<Impulse>,
+    /// By slot.
+    pub(super) memory: Vec<ManifoldMemory>,
     /// By slot.
     pub(super) found: Vec<FoundManifold>,
     pub(super) poses: Vec<PoseRecord>,
@@ -67,12 +69,14 @@ impl Kept {
         reserve(&mut free, count, "free_slots")?;
         reserve(&mut self.batch_of_slot, count, "batch_of_slot")?;
         reserve(&mut self.found, count, "found_manifolds")?;
+        reserve(&mut self.memory, count, "slot_memory")?;
         reserve(&mut self.impulses, 4 * count, "slot_impulses")?;
         free.extend((old..capacity).rev());
         free.append(&mut self.free);
         self.free = free;
         self.batch_of_slot.resize(count, UNBATCHED);
         self.found.resize(count, FoundManifold::zeroed());
+        self.memory.resize(count, ManifoldMemory::default());
         self.impulses.resize(4 * count, contact::NO_IMPULSE);
         Ok(())
     }
@@ -82,7 +86,7 @@ impl Kept {
         let body =
             2 * size_of::<BodyState>() + size_of::<BodyProps>() + size_of::<PoseRecord>() + size_of::<SolverBody>();
         let collider = size_of::<Collider>() + size_of::<Aabb>();
-        let slot = 8 + 4 * size_of::<Impulse>() + size_of::<FoundManifold>();
+        let slot = 8 + 4 * size_of::<Impulse>() + size_of::<ManifoldMemory>() + size_of::<FoundManifold>();
         let pair = 2 * size_of::<Pair>() + size_of::<Manifold>() + 12;
         let counted = self.states.len() * body
             + self.colliders.len() * collider
@@ -202,7 +206,8 @@ impl Kept {
             let index = batches.order[c] as usize;
             let pair = &matched.pairs[index];
             let stored = &self.impulses[4 * pair.slot as usize..][..4];
-            prepare::Contact { pair, manifold: &manifolds[index], stored }
+            let memory = &self.memory[pair.slot as usize];
+            prepare::Contact { pair, manifold: &manifolds[index], stored, memory }
         });
         let run = watch.next(run, "solver");
         let moving = solver::Bodies { solver: &mut bodies, states: &states, props: &self.props };
@@ -254,12 +259,15 @@ impl Kept {
                 unsafe { impulses.set(slot, own) };
             }
         });
-        self.rows.for_each_constraint(|c, solved| {
+        let memory = Shared::new(&mut self.memory);
+        self.rows.for_each_constraint(|c, remembered, solved| {
             let index = batches.order[c] as usize;
             let slot = matched.pairs[index].slot as usize;
             let stored = std::array::from_fn(|k| store::store(&manifolds[index], k, solved[k].0, solved[k].1));
             // SAFETY: as above; each constraint is one of those pairs.
             unsafe { impulses.set(slot, stored) };
+            // SAFETY: as above.
+            unsafe { memory.set(slot, store::store_memory(&manifolds[index], remembered)) };
         });
     }
 }

@@ -65,6 +65,7 @@ impl World {
             free: Vec::new(),
             batch_of_slot: Vec::new(),
             impulses: Vec::new(),
+            memory: Vec::new(),
             found: Vec::new(),
             rows: Rows::default(),
         };

@@ -119,7 +119,8 @@ impl World {
         let poses: Vec<PoseRecord> =
             packed.states.iter().zip(&packed.props).map(|(s, p)| PoseRecord::of(s, p)).collect();
         gpu.queue.write_buffer(buffers.buffer("poses")?, 0, bytemuck::cast_slice(&poses));
-        let built = Built { plan: packed.plan, choice: Choice::new(&params, &editor) };
+        let solver = params.step_params(0, Vec3::ZERO).solver;
+        let built = Built { plan: packed.plan, choice: Choice::new(&params, &editor), solver };
         let stages = {
             let _span = Span::enter("pipelines");
             Stages::new(&gpu, &mut pipelines, &sizes, &built)?
@@ -241,7 +242,8 @@ impl World {
         step.collider_count = colliders;
         step.edit_ranges = edits.ranges.len() as u32;
         step.cell_table_bits = limits::cell_table_bits(colliders);
-        let wants = Built { plan: self.editor.plan(), choice: Choice::new(&self.params, &self.editor) };
+        let choice = Choice::new(&self.params, &self.editor);
+        let wants = Built { plan: self.editor.plan(), choice, solver: step.solver };
         step.large_limit = limits::large_limit(colliders, wants.choice.large_tree);
         step.drop_pair = std::mem::replace(&mut self.drop_pair, u32::MAX);
         self.submitted += 1;
@@ -278,8 +280,9 @@ impl World {
     fn submit(&mut self, mut record: Record) -> Result<()> {
         let mut wanted = self.built;
         let widened = wanted.plan.widen(&record.wants.plan);
-        if widened || wanted.choice != record.wants.choice {
-            wanted.choice = record.wants.choice;
+        let Built { choice, solver, .. } = record.wants;
+        if widened || (wanted.choice, wanted.solver) != (choice, solver) {
+            (wanted.choice, wanted.solver) = (choice, solver);
             let run = self.watch.begin("pipelines");
             self.stages = Stages::new(&self.gpu, &mut self.pipelines, &self.sizes, &wanted)?;
             self.watch.end(run);
