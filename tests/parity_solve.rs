@@ -31,13 +31,14 @@ mod off {
     // A gap is divided by the sub-step, 240 to the second: its last bit is 3e-5 m/s. Velocities, impulses, approach.
     // 3.5e-5 3.1e-5 6.3e-6
     pub(crate) const SWEEP: [Field; 3] = [("velocity", 3e-4), ("impulse", 3e-4), ("approach", 1e-4)];
-    // 7.0e-5 6.0e-5 4.3e-5
-    pub(crate) const LONG: [Field; 3] = [("velocity", 1e-1), ("impulse", 1e-1), ("approach", 1e-1)];
-    // 8.2e-5 1.1e-4 8.0e-5
-    pub(crate) const STEP: [Field; 3] = [("velocity", 1e-1), ("impulse", 1e-1), ("approach", 1e-1)];
-    pub(crate) const WEIGHT: Field = ("weight", 1e-3);
-    pub(crate) const STEP_WAY: Field = ("translation", 1e-5); // 2.2e-7
-    pub(crate) const STEP_TURN: Field = ("turn", 1e-5); // 2.5e-7
+    // 1.3e-4 8.2e-3 1.2e-4
+    pub(crate) const LONG: [Field; 3] = [("velocity", 5e-4), ("impulse", 2e-2), ("approach", 5e-4)];
+    // Eight sub-steps of the one pass: the last bit decides which contact closes a gap and which one presses, and in a
+    // heap of 3,000 bodies some decide otherwise. (Soft, four: 8.2e-5 1.1e-4 8.0e-5.) 1.7e-2 2.0e-2 6.6e-3
+    pub(crate) const STEP: [Field; 3] = [("velocity", 5e-2), ("impulse", 5e-2), ("approach", 2e-2)];
+    pub(crate) const WEIGHT: Field = ("weight", 1e-5); // 0
+    pub(crate) const STEP_WAY: Field = ("translation", 2e-4); // 6.0e-5
+    pub(crate) const STEP_TURN: Field = ("turn", 3e-4); // 8.1e-5
 }
 
 fn check_solver(
