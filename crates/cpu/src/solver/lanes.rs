@@ -310,9 +310,9 @@ impl BodyLanes {
     /// As for [`BodyLanes::scatter`].
     #[inline(always)]
     pub(crate) unsafe fn weigh(&self, bodies: &Shared<'_, f32x4>, index: [u32; LANES], weights: Weights) {
-        for lane in 0..LANES {
+        for (lane, body) in index.into_iter().enumerate() {
             if self.inverse_mass.as_array()[lane] > 0.0 {
-                let row = ROWS * index[lane] as usize + START;
+                let row = ROWS * body as usize + START;
                 for (row, more) in [(row, weights.weight), (row + 1, weights.weighted)] {
                     // SAFETY: the caller's promise.
                     let mut start = unsafe { bodies.get(row) };
@@ -339,9 +339,9 @@ impl BodyLanes {
     ) {
         let linear = self.inverse_mass * push;
         let angular = self.inverse_inertia_times(r.cross(push));
-        for lane in 0..LANES {
+        for (lane, body) in index.into_iter().enumerate() {
             if self.inverse_mass.as_array()[lane] > 0.0 {
-                let row = ROWS * index[lane] as usize + START;
+                let row = ROWS * body as usize + START;
                 for (row, change) in [(row, linear), (row + 1, angular)] {
                     let at = |v: Lane| sign * v.as_array()[lane];
                     // SAFETY: the caller's promise.
