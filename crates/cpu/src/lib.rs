@@ -15,6 +15,7 @@ pub mod primitives;
 pub mod query;
 mod shared;
 pub mod solver;
+mod workers;
 mod world;
 
 pub use world::World;

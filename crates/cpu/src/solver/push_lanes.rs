@@ -1,8 +1,7 @@
-//! What the laws of `push` do, four constraints at a time: the same operations in the same order, so the same results.
+//! What the laws of `push` do, several constraints at a time: the same operations in the same order, so the same results.
 
-use super::lanes::{BodyLanes, HeadLanes, PointLanes, V3};
+use super::lanes::{BodyLanes, HeadLanes, Lane, PointLanes, V3};
 use tumble_core::layout::StepParams;
-use wide::f32x4;
 
 #[inline(always)]
 pub(super) fn warm_start(head: &HeadLanes, points: &[PointLanes], a: &mut BodyLanes, b: &mut BodyLanes) {
@@ -30,7 +29,7 @@ pub(super) fn count(p: &mut PointLanes) {
 
 /// Gaps at one point of each.
 #[inline(always)]
-pub(super) fn separation(head: &HeadLanes, p: &PointLanes, a: &BodyLanes, b: &BodyLanes) -> f32x4 {
+pub(super) fn separation(head: &HeadLanes, p: &PointLanes, a: &BodyLanes, b: &BodyLanes) -> Lane {
     let [ra, rb] = arms(head, p);
     let (core_a, core_b) = (ra - head.round_a * head.normal, rb - head.round_b * head.normal);
     let moved = b.translation - a.translation + b.turned(core_b) - a.turned(core_a);
@@ -45,7 +44,7 @@ pub(super) fn push_tangent(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLan
     let y = p.tangent[1] - p.tangent_mass * t2.dot(slide);
     let length = (x * x + y * y).sqrt();
     let most = head.friction * p.normal;
-    let scale = length.simd_gt(most).bitselect(most / length, f32x4::ONE);
+    let scale = length.simd_gt(most).bitselect(most / length, Lane::ONE);
     let (x, y) = (x * scale, y * scale);
     let push = (x - p.tangent[0]) * t1 + (y - p.tangent[1]) * t2;
     let good = push.x.is_finite() & push.y.is_finite() & push.z.is_finite();
@@ -57,13 +56,13 @@ pub(super) fn push_tangent(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLan
 #[inline(always)]
 pub(super) fn bounce(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLanes, b: &mut BodyLanes, step: &StepParams) {
     let (restitution, normal) = (head.restitution, head.normal);
-    let threshold = f32x4::splat(-step.restitution_threshold);
-    let bounces = restitution.simd_gt(f32x4::ZERO) & !p.approach.simd_gt(threshold) & p.total[0].simd_gt(f32x4::ZERO);
+    let threshold = Lane::splat(-step.restitution_threshold);
+    let bounces = restitution.simd_gt(Lane::ZERO) & !p.approach.simd_gt(threshold) & p.total[0].simd_gt(Lane::ZERO);
     let [ra, rb] = arms(head, p);
     let velocity = normal.dot(b.velocity_at(rb) - a.velocity_at(ra));
     let change = -p.normal_mass * (velocity + restitution * p.approach);
     let sum = p.normal + change;
-    let new = sum.fast_max(f32x4::ZERO);
+    let new = sum.fast_max(Lane::ZERO);
     let push = new - p.normal;
     let good = bounces & sum.is_finite();
     p.normal = good.bitselect(new, p.normal);

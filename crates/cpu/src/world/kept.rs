@@ -196,10 +196,10 @@ impl Kept {
     /// Solves and writes everything that lives past the step.
     pub(super) fn commit(&mut self, planned: Planned, step: &StepParams, restitution: bool, watch: &mut Stopwatch) {
         let run = watch.begin("prepare");
-        let Planned { states, matched, manifolds, batches, mut control } = planned;
+        let Planned { mut states, matched, manifolds, batches, mut control } = planned;
         let mut bodies: Vec<SolverBody> = (0..states.len())
             .into_par_iter()
-            .with_min_len(512)
+            .with_min_len(256)
             .map(|i| prepare::prepare_body(&states[i], &self.props[i], batches.masks[i]))
             .collect();
         self.rows.build(&batches.start, &self.colliders, &bodies, step, |c| {
@@ -215,16 +215,15 @@ impl Kept {
         let run = watch.next(run, "motion");
         contact::commit_free(&mut self.free, &matched);
         self.commit_slots(&states, &matched, &manifolds, &batches);
-        let committed: Vec<_> =
-            bodies.par_iter().zip(&states).with_min_len(512).map(|(b, s)| motion::commit(b, s)).collect();
-        for (slot, (_, bad)) in committed.iter().enumerate() {
-            if *bad {
-                name(&mut control, slot);
-            }
-        }
-        self.states = committed.into_par_iter().with_min_len(512).map(|(state, _)| state).collect();
-        let posed = self.states.par_iter().zip(&self.props).with_min_len(512);
-        self.poses = posed.map(|(s, p)| PoseRecord::of(s, p)).collect();
+        self.poses.resize(states.len(), PoseRecord::zeroed());
+        let ends = bodies.par_iter().zip(&self.props).zip(states.par_iter_mut().zip(&mut self.poses));
+        let bad = ends.enumerate().with_min_len(256).filter_map(|(slot, ((body, props), (state, pose)))| {
+            let (new, bad) = motion::commit(body, state);
+            (*state, *pose) = (new, PoseRecord::of(&new, props));
+            bad.then_some(slot)
+        });
+        bad.collect::<Vec<_>>().into_iter().for_each(|slot| name(&mut control, slot));
+        self.states = states;
         self.pairs = matched.pairs;
         control.frozen_count = self
             .states
@@ -243,7 +242,7 @@ impl Kept {
         let found = Shared::new(&mut self.found);
         let batch_of_slot = Shared::new(&mut self.batch_of_slot);
         let impulses = Shared::new(bytemuck::cast_slice_mut::<Impulse, [Impulse; 4]>(&mut self.impulses));
-        matched.pairs.par_iter().enumerate().with_min_len(1024).for_each(|(i, pair)| {
+        matched.pairs.par_iter().enumerate().with_min_len(256).for_each(|(i, pair)| {
             let (slot, manifold) = (pair.slot as usize, manifolds[i]);
             let (mut batch, mut own) = (UNBATCHED, [contact::NO_IMPULSE; 4]);
             contact::commit_pair(&manifold, batches.of_pair[i], &mut batch, &mut own);
