@@ -162,7 +162,7 @@ fn constraints(
             inverse(response(a, b, ra, rb, normal, normal)),
             inverse(stiffest),
             dot(normal, dv),
-            0u,
+            0.0,
             vec3<f32>(),
             0u,
         );
@@ -230,6 +230,7 @@ fn carry(
             // The last that is the same, though no two should be.
             let k = select(select(select(0u, 1u, same.y), 2u, same.z), 3u, same.w);
             impulse = slot_impulses[first + k];
+            points[4u * c + i].deviation = slot_memory[next_pairs[index].slot].deviations[k];
         }
         impulses[4u * c + i] = impulse;
     }
