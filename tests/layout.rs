@@ -95,7 +95,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             stop, overflow, needed, step, old_pair_count, free_count, recolor, frozen_count, pair_count, processed,
             new_count, dead_count, constraint_count, point_count, batch_count, rounds, unplaced, last_count,
             large_count, max_degree, solved, turns, cell_class, cell_bits, center_min, inverse_cell, center_max,
-            pad_a, batch_start, quarantined, pad_b
+            pad_a, batch_start, quarantined, pad_b, islands, islands_open, asleep, islands_asleep
         }
         EditRecord { op, target, kind, generation, data }
         EditRange { first, count }

@@ -18,6 +18,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("broadphase/sweep", include_str!("../broadphase/sweep.wgsl")),
     ("contact", include_str!("../contact.wgsl")),
     ("edit", include_str!("../edit.wgsl")),
+    ("island", include_str!("../island.wgsl")),
     ("motion", include_str!("../motion.wgsl")),
     ("narrowphase/ball_ball", include_str!("../narrowphase/ball_ball.wgsl")),
     ("narrowphase/ball_cuboid", include_str!("../narrowphase/ball_cuboid.wgsl")),

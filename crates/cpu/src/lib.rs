@@ -8,6 +8,7 @@ pub mod bounds;
 pub mod broadphase;
 pub mod contact;
 pub mod edit;
+pub mod island;
 mod math;
 pub mod motion;
 pub mod narrowphase;

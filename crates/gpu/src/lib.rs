@@ -11,6 +11,7 @@ pub mod buffers;
 mod contact;
 pub mod device;
 mod edit;
+mod island;
 mod motion;
 mod narrowphase;
 pub mod pipelines;

@@ -5,6 +5,7 @@ use crate::bounds::Bounds;
 use crate::broadphase::{Broadphase, Choice};
 use crate::contact::Contact;
 use crate::edit::Edit;
+use crate::island::Island;
 use crate::motion::Motion;
 use crate::narrowphase::Narrowphase;
 use crate::solver::Solver;
@@ -28,6 +29,8 @@ pub(crate) struct Stages {
     pub(crate) broadphase: Broadphase,
     contact: Contact,
     narrowphase: Narrowphase,
+    /// Where something asks for islands.
+    island: Option<Island>,
     batch: Batch,
     solver: Solver,
     motion: Motion,
@@ -42,6 +45,7 @@ impl Stages {
             broadphase: Broadphase::new(gpu, pipelines, sizes, &built.choice)?,
             contact: Contact::new(gpu, pipelines, sizes)?,
             narrowphase: Narrowphase::new(gpu, pipelines, plan)?,
+            island: plan.islands.then(|| Island::new(gpu, pipelines)).transpose()?,
             batch: Batch::new(gpu, pipelines, sizes)?,
             solver: Solver::new(gpu, pipelines, plan)?,
             motion: Motion::new(gpu, pipelines)?,
@@ -66,6 +70,9 @@ impl Stages {
         self.broadphase.record(recorder, buffers, step)?;
         self.contact.record_match(recorder, buffers)?;
         self.narrowphase.record(recorder, self.contact.a_pair())?;
+        if let Some(island) = &self.island {
+            island.record(recorder, step, self.contact.a_pair())?;
+        }
         self.batch.record(recorder, buffers, step, self.contact.a_pair())?;
 
         self.solver.record(recorder, buffers, &self.motion, step)?;

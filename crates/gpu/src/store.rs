@@ -56,7 +56,7 @@ enum Per {
 }
 
 /// Name, bytes of an element, what it follows, whether its content outlives a step.
-const ARRAYS: [(&str, usize, Per, bool); 29] = [
+const ARRAYS: [(&str, usize, Per, bool); 30] = [
     ("states", size_of::<BodyState>(), Per::Body, true),
     ("work_states", size_of::<BodyState>(), Per::Body, false),
     ("props", size_of::<BodyProps>(), Per::Body, true),
@@ -64,6 +64,7 @@ const ARRAYS: [(&str, usize, Per, bool); 29] = [
     ("solver_bodies", size_of::<SolverBody>(), Per::Body, false),
     ("masks", 8, Per::Body, false),
     ("claims", 4, Per::Body, false),
+    ("islands", 4, Per::Body, false),
     ("colliders", size_of::<Collider>(), Per::Collider, true),
     ("aabbs", size_of::<Aabb>(), Per::Collider, false),
     ("large_list", 4, Per::Collider, false),
