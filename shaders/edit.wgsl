@@ -150,6 +150,7 @@ fn apply_to_body(record: EditRecord, state: ptr<function, BodyState>, own_props:
         case EDIT_FORCE_AT: {
             pull(state, *own_props, a, cross(b - (*state).position, a));
         }
+        case EDIT_WAKE: {}
         default: {
             (*state).flags |= BODY_FROZEN;
             (*state).linear_velocity = vec3<f32>();
@@ -194,6 +195,7 @@ fn read_props(record: EditRecord) -> BodyProps {
     read.linear_damping = bitcast<f32>(record.data[2].w);
     read.frame = xyzw(record.data[3]);
     read.angular_damping = bitcast<f32>(record.data[4].x);
+    read.reach = bitcast<f32>(record.data[4].y);
     return read;
 }
 

@@ -17,6 +17,8 @@
 
 // Largest turn of a body in a sub-step, rad; it bounds the number of pieces of a turn.
 const MAX_TURN: f32 = 32.0;
+// Flags of a body that stands still, whatever its kind.
+const STILL: u32 = BODY_FROZEN | BODY_ASLEEP;
 // Beyond this a velocity (m/s, rad/s) or position (m) is taken for what it is: an explosion.
 const STATE_LIMIT: f32 = 1e9;
 const COUNTER_FROZEN_COUNT: u32 = 108u; // scratch word of the counters
@@ -145,7 +147,7 @@ fn integrate_positions(
         return;
     }
     let kind = work_states[i].flags & BODY_KIND;
-    if kind == BODY_NONE || kind == BODY_FIXED || (work_states[i].flags & BODY_FROZEN) != 0u {
+    if kind == BODY_NONE || kind == BODY_FIXED || (work_states[i].flags & STILL) != 0u {
         return;
     }
     var way = solver_bodies[i].linear_velocity * step.h;
@@ -175,7 +177,7 @@ fn commit(
     var state = work_states[i];
     state.force = vec3<f32>();
     state.torque = vec3<f32>();
-    if (state.flags & BODY_KIND) != BODY_NONE && (state.flags & BODY_FROZEN) == 0u {
+    if (state.flags & BODY_KIND) != BODY_NONE && (state.flags & STILL) == 0u {
         let body = solver_bodies[i];
         let position = state.position + body.translation;
         let good = small(position) && small(body.linear_velocity) && small(body.angular_velocity)

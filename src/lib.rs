@@ -35,7 +35,7 @@ pub use tumble_core as core;
 pub use tumble_core::{
     BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Contact, ContactPoint, Contacts,
     Editor, Error, Inserted, MortonBits, Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Params, Pose, Poses,
-    Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, StepReport, Traversal, Velocities, Velocity,
+    Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, Sleep, StepReport, Traversal, Velocities, Velocity,
 };
 pub use world::{Backend, World};
 
@@ -44,7 +44,7 @@ pub mod prelude {
     pub use crate::{
         Backend, BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Contact,
         ContactPoint, Contacts, Error, Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Params, Pose, Poses,
-        Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, StepReport, Velocities, Velocity, World,
+        Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, Sleep, StepReport, Velocities, Velocity, World,
     };
     pub use glam::{Quat, Vec3};
 }

@@ -71,8 +71,9 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         }
         BodyProps {
             inverse_inertia, inverse_mass, inertia, gravity_scale, center_of_mass, linear_damping, frame,
-            angular_damping, pad_a, pad_b, pad_c
+            angular_damping, reach, pad_b, pad_c
         }
+        Rest { position, time, rotation, island, pad_a, pad_b, pad_c }
         SolverBody {
             linear_velocity, inverse_mass, angular_velocity, touched, translation, pad_a, delta,
             inverse_inertia_diagonal, pad_b, inverse_inertia_off, pad_c
@@ -129,7 +130,7 @@ macro_rules! constants {
 
 fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
     constants! {
-        body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN }
+        body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN, ASLEEP, STAYS_AWAKE }
         shape_kind as "SHAPE_" { NONE, BALL, CUBOID, HALFSPACE }
         aabb_body as "AABB_" { INDEX, FIXED, DYNAMIC, LIVE }
         pair_kind as "PAIR_" {
@@ -137,8 +138,8 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
         }
         overflow as "OVERFLOW_" { NONE, PAIRS, TURNS, LAST_BATCH, UNBOUNDED, SWEEP }
         edit_op as "EDIT_" {
-            SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, COLLIDER,
-            COLLIDER_REMOVE
+            SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, WAKE,
+            COLLIDER, COLLIDER_REMOVE
         }
         query_word as "QUERY_" { UNBOUNDED, TURNS, TOTAL, COUNT }
         tree_members as "MEMBERS_" { MOVING, FIXED, LARGE, ALL }

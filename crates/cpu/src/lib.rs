@@ -15,6 +15,7 @@ pub mod narrowphase;
 pub mod primitives;
 pub mod query;
 mod shared;
+pub mod sleep;
 pub mod solver;
 mod world;
 

@@ -1,20 +1,22 @@
 //! What a world keeps, and a step of it: the plan phase, which writes nothing that lasts, and the commit.
 
-use crate::batch::{self, Batches};
+use super::asleep::{self, Asleep, Outcome, Waking};
+use crate::batch::{self, Batches, Ends};
 use crate::broadphase::{self, Boxes, Finder, Search, TooMany};
 use crate::contact::{self, Matched};
 use crate::shared::Shared;
 use crate::solver::{self, Rows, prepare, store};
-use crate::{bounds, edit, motion, narrowphase};
+use crate::{bounds, edit, motion, narrowphase, sleep};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{
     Aabb, BodyProps, BodyState, Collider, Control, FoundManifold, Impulse, Manifold, Pair, PoseRecord,
     QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, body_flags,
 };
 use tumble_core::stopwatch::Stopwatch;
-use tumble_core::{Broadphase, Error, Params, Result, limits};
+use tumble_core::{Broadphase, Error, Params, Result, Sleep, limits};
 
 /// What lives past a step; written only when a step commits (properties and colliders by edits, absolutely).
 pub(super) struct Kept {
@@ -33,6 +35,7 @@ pub(super) struct Kept {
     pub(super) poses: Vec<PoseRecord>,
     /// The solver's rows, kept for their room alone.
     pub(super) rows: Rows,
+    pub(super) asleep: Asleep,
 }
 
 /// What the plan phase of a step finds; nothing of it lasts unless the step commits.
@@ -42,6 +45,8 @@ pub(super) struct Planned {
     pub(super) manifolds: Vec<Manifold>,
     pub(super) batches: Batches,
     pub(super) control: Control,
+    ends: Vec<Ends>,
+    waking: Waking,
 }
 
 /// What a step is to do, beside its numbers.
@@ -88,7 +93,7 @@ impl Kept {
             + self.colliders.len() * collider
             + self.batch_of_slot.len() * slot
             + self.pairs.len() * pair;
-        counted as u64 + self.rows.bytes()
+        counted as u64 + self.rows.bytes() + self.asleep.bytes()
     }
 
     /// Everything up to the first write to what lives past the step.
@@ -102,14 +107,18 @@ impl Kept {
         let run = watch.begin("edit");
         let mut control = Control { step: step.step, recolor: self.control.recolor, ..Control::zeroed() };
         let states = self.edit(asked.edits, step);
-        let states = self.quarantine(states, &mut control);
+        let Asked { edits, params, broadphase } = *asked;
+        let mut states = self.quarantine(states, &mut control);
+        let (mut waking, woken) = self.wake_by_edits(edits, params, step, &mut states);
         let run = watch.next(run, "bounds");
         let aabbs: Vec<Aabb> =
             self.colliders.par_iter().with_min_len(256).map(|c| self.bounds(c, &states, step)).collect();
         let run = watch.next(run, "broadphase");
-        let Asked { edits, params, broadphase } = *asked;
         let boxes = Boxes::new(&aabbs);
-        let found = finder.find(&boxes, &Search { step, params, broadphase, stale: edits.stale });
+        let mut stale = edits.stale;
+        stale.moving |= self.asleep.changed || waking.any();
+        let mut found = finder.find(&boxes, &Search { step, params, broadphase, stale });
+        self.find_sleepers(&boxes, &states, &waking, step.pair_capacity, &mut found);
         let run = watch.next(run, "contact");
         control.pair_count = found.count.min(u32::MAX.into()) as u32;
         control.turns = found.turns;
@@ -122,14 +131,16 @@ impl Kept {
             Some(TooMany::Unbounded(count)) => return over("half-spaces", count, limits::UNBOUNDED_LIMIT),
             None => {}
         }
-        if control.pair_count > step.pair_capacity {
-            return over("pairs", control.pair_count, step.pair_capacity);
+        let with_asleep = control.pair_count.saturating_add(self.asleep.pairs_after(&waking));
+        if with_asleep > step.pair_capacity {
+            return over("pairs", with_asleep, step.pair_capacity);
         }
-        let matched = contact::match_pairs(&self.pairs, &found.pairs, &self.colliders, &self.free, step.step);
+        let old = if woken.is_empty() { Cow::from(&self.pairs) } else { asleep::merged(&self.pairs, &woken).into() };
+        let mut matched = contact::match_pairs(&old, &found.pairs, &self.colliders, &self.free, step.step);
         control.new_count = matched.new_count;
         control.dead_count = matched.dead_slots.len() as u32;
         let run = watch.next(run, "narrowphase");
-        let manifolds: Vec<Manifold> = matched
+        let mut manifolds: Vec<Manifold> = matched
             .pairs
             .par_iter()
             .enumerate()
@@ -139,6 +150,15 @@ impl Kept {
                 false => narrowphase::collide(pair, &self.colliders, &states, &self.found[pair.slot as usize], step),
             })
             .collect();
+        let woken = self.wake_by_touch(&matched.pairs, &manifolds, &mut states, &mut waking);
+        if !woken.is_empty() {
+            let collide = |pair: &Pair| {
+                narrowphase::collide(pair, &self.colliders, &states, &self.found[pair.slot as usize], step)
+            };
+            let theirs: Vec<Manifold> = woken.par_iter().with_min_len(64).map(collide).collect();
+            asleep::join(&mut matched.pairs, &mut manifolds, &woken, &theirs);
+            control.pair_count = matched.pairs.len() as u32;
+        }
         control.processed = control.pair_count - u32::from(step.drop_pair < control.pair_count);
         control.constraint_count = manifolds.iter().map(|m| u32::from(m.count > 0)).sum();
         control.point_count = manifolds.iter().map(|m| m.count).sum();
@@ -158,7 +178,7 @@ impl Kept {
         if control.last_count > step.last_limit {
             return over("last batch", control.last_count, step.last_limit);
         }
-        Ok(Planned { states, matched, manifolds, batches, control })
+        Ok(Planned { states, matched, manifolds, batches, control, ends, waking })
     }
 
     /// The working copy of the states with the step's edits applied.
@@ -184,15 +204,26 @@ impl Kept {
         states
     }
 
+    /// Those asleep are kept elsewhere, and are nowhere here.
     fn bounds(&self, collider: &Collider, states: &[BodyState], step: &StepParams) -> Aabb {
         let body = collider.body as usize;
+        if sleep::sleeps(states[body].flags) {
+            return bounds::NOWHERE;
+        }
         bounds::collider_bounds(collider, &states[body], &self.props[body], step)
     }
 
     /// Solves and writes everything that lives past the step.
-    pub(super) fn commit(&mut self, planned: Planned, step: &StepParams, restitution: bool, watch: &mut Stopwatch) {
+    pub(super) fn commit(
+        &mut self,
+        planned: Planned,
+        step: &StepParams,
+        asked: (bool, Option<Sleep>),
+        watch: &mut Stopwatch,
+    ) {
         let run = watch.begin("prepare");
-        let Planned { states, matched, manifolds, batches, mut control } = planned;
+        let Planned { states, matched, manifolds, batches, mut control, ends, waking } = planned;
+        let (restitution, sleep) = asked;
         let mut bodies: Vec<SolverBody> = (0..states.len())
             .into_par_iter()
             .with_min_len(512)
@@ -218,9 +249,11 @@ impl Kept {
             }
         }
         self.states = committed.into_par_iter().with_min_len(512).map(|(state, _)| state).collect();
+        self.pairs = matched.pairs;
+        let outcome = Outcome { states: &states, manifolds: &manifolds, ends: &ends, waking };
+        self.settle(outcome, &sleep, step, &mut control);
         let posed = self.states.par_iter().zip(&self.props).with_min_len(512);
         self.poses = posed.map(|(s, p)| PoseRecord::of(s, p)).collect();
-        self.pairs = matched.pairs;
         control.frozen_count = self
             .states
             .iter()

@@ -1,9 +1,11 @@
 //! A world on the CPU: the face, capacity and the edit log. What it keeps, and the order of the passes, is in `kept`.
 
+mod asleep;
 mod contacts;
 mod kept;
 mod queries;
 
+use asleep::Asleep;
 use crate::broadphase::Finder;
 use crate::query;
 use crate::solver::Rows;
@@ -67,6 +69,7 @@ impl World {
             impulses: Vec::new(),
             found: Vec::new(),
             rows: Rows::default(),
+            asleep: Asleep::default(),
         };
         let (bodies, colliders) = (kept.states.len() as u32, kept.colliders.len() as u32);
         kept.reserve_pairs(limits::initial_pairs(&params.capacities, colliders))?;
@@ -152,6 +155,12 @@ impl World {
         step.cell_table_bits = limits::cell_table_bits(step.collider_count);
         step.large_limit = limits::large_limit(step.collider_count, self.editor.spread().is_wide());
         step.drop_pair = self.drop_pair;
+        if self.kept.is_idle(&edits, &self.params, &step) {
+            self.kept.pass_time(&step);
+            self.last_step.step = step.step;
+            self.finish(self.watch.runs().len(), self.report.broadphase);
+            return Ok(());
+        }
         self.failed = self.run(&edits, step, &span).err();
         if let Some(error) = self.failed.clone() {
             self.editor.put_back(edits);
@@ -186,7 +195,7 @@ impl World {
 
     /// Plans and commits a step, growing the pair list between where that is needed and allowed.
     fn run(&mut self, edits: &EditBatch, mut step: StepParams, span: &Span) -> Result<()> {
-        let restitution = self.editor.plan().restitution;
+        let then = (self.editor.plan().restitution, self.params.sleep);
         let broadphase = self.params.broadphase.resolve(self.editor.spread());
         loop {
             let attempt = self.watch.runs().len();
@@ -195,7 +204,7 @@ impl World {
             let asked = Asked { edits, params: &self.params, broadphase };
             let mut planned_and_committed = || {
                 let planned = kept.plan(&asked, finder, &step, watch)?;
-                kept.commit(planned, &step, restitution, watch);
+                kept.commit(planned, &step, then, watch);
                 Ok(())
             };
             let run = match step.collider_count <= ALONE {
