@@ -96,7 +96,8 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             stop, overflow, needed, step, old_pair_count, free_count, recolor, frozen_count, pair_count, processed,
             new_count, dead_count, constraint_count, point_count, batch_count, rounds, unplaced, last_count,
             large_count, max_degree, solved, turns, cell_class, cell_bits, center_min, inverse_cell, center_max,
-            pad_a, batch_start, quarantined, pad_b, islands, islands_open, asleep, islands_asleep
+            pad_a, batch_start, quarantined, pad_b, islands, islands_open, asleep, islands_asleep,
+            awake, manifolds_asleep, pad_c
         }
         EditRecord { op, target, kind, generation, data }
         EditRange { first, count }
@@ -112,7 +113,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             dt, h, inverse_h, substeps, gravity, step, bias_rate, mass_scale, impulse_scale, push_speed,
             speculative_distance, restitution_threshold, body_count, collider_count, pair_capacity, cell_table_bits,
             large_limit, edit_ranges, drop_pair, write_poses, batch_rounds, last_limit, wide_batches,
-            static_bias_rate, static_mass_scale, static_impulse_scale
+            static_bias_rate, static_mass_scale, static_impulse_scale, sleep_distance, sleep_time, wake_all, pad_a
         }
     })
 }
@@ -132,9 +133,9 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
     constants! {
         body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN, ASLEEP, STAYS_AWAKE }
         shape_kind as "SHAPE_" { NONE, BALL, CUBOID, HALFSPACE }
-        aabb_body as "AABB_" { INDEX, FIXED, DYNAMIC, LIVE }
+        aabb_body as "AABB_" { INDEX, FIXED, DYNAMIC, LIVE, ASLEEP }
         pair_kind as "PAIR_" {
-            NONE, BALL_BALL, BALL_CUBOID, CUBOID_CUBOID, BALL_HALFSPACE, CUBOID_HALFSPACE, COUNT, MASK, FRESH
+            NONE, BALL_BALL, BALL_CUBOID, CUBOID_CUBOID, BALL_HALFSPACE, CUBOID_HALFSPACE, COUNT, MASK, FRESH, ASLEEP
         }
         overflow as "OVERFLOW_" { NONE, PAIRS, TURNS, LAST_BATCH, UNBOUNDED, SWEEP }
         edit_op as "EDIT_" {

@@ -8,9 +8,8 @@ mod worlds;
 
 use tumble::prelude::*;
 use tumble_core::{BodyHandle, Editor, Sleep, StepReport, measures, scenes};
-use worlds::{Side, hash, report, steps};
+use worlds::{SIDES, Side, hash, report, steps};
 
-const SIDES: [Side; 1] = [Side::Cpu];
 const SLEEP: Sleep = Sleep { distance: 2e-3, time: 0.5 };
 
 fn asleep_params() -> Params {
@@ -366,7 +365,7 @@ fn a_wake_survives_want_of_room() {
 fn sides_agree_on_who_sleeps() {
     let mut scene = scenes::many_pyramids(3, 4);
     scene.insert(RigidBodyBuilder::dynamic().translation(Vec3::Y * 300.0), ColliderBuilder::ball(0.5));
-    let [cpu, gpu] = [Side::Cpu, Side::Cpu].map(|side| {
+    let [cpu, gpu] = SIDES.map(|side| {
         let mut world = side.world(&scene, &asleep_params());
         steps(&mut world, 200);
         let report = report(&mut world);

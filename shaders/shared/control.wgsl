@@ -50,6 +50,8 @@ const CONTROL_ISLANDS: u32 = 112u;
 const CONTROL_ISLANDS_OPEN: u32 = 113u;
 const CONTROL_ASLEEP: u32 = 114u;
 const CONTROL_ISLANDS_ASLEEP: u32 = 115u;
+const CONTROL_AWAKE: u32 = 116u;
+const CONTROL_MANIFOLDS_ASLEEP: u32 = 117u;
 
 struct Control {
     stop: u32,
@@ -87,4 +89,7 @@ struct Control {
     islands_open: u32,
     asleep: u32,
     islands_asleep: u32,
+    awake: u32,
+    manifolds_asleep: u32,
+    pad_c: vec2<u32>,
 }

@@ -27,4 +27,8 @@ struct StepParams {
     static_bias_rate: f32,
     static_mass_scale: f32,
     static_impulse_scale: f32,
+    sleep_distance: f32,
+    sleep_time: f32,
+    wake_all: u32,
+    pad_a: u32,
 }

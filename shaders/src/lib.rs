@@ -57,6 +57,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/thread", include_str!("../shared/thread.wgsl")),
     ("shared/tree", include_str!("../shared/tree.wgsl")),
     ("shared/workgroup", include_str!("../shared/workgroup.wgsl")),
+    ("sleep", include_str!("../sleep.wgsl")),
     ("solver/passes", include_str!("../solver/passes.wgsl")),
     ("solver/prepare", include_str!("../solver/prepare.wgsl")),
     ("solver/soft", include_str!("../solver/soft.wgsl")),

@@ -259,6 +259,8 @@ impl Params {
             batch_rounds: BATCH_ROUNDS,
             last_limit: LAST_LIMIT,
             write_poses: 1,
+            sleep_distance: self.sleep.map_or(-1.0, |sleep| sleep.distance),
+            sleep_time: self.sleep.map_or(f32::MAX, |sleep| sleep.time),
             ..bytemuck::Zeroable::zeroed()
         }
     }

@@ -112,7 +112,7 @@ impl StepReport {
         Self {
             step: control.step as u64,
             pairs: control.pair_count,
-            manifolds: control.constraint_count,
+            manifolds: control.constraint_count + control.manifolds_asleep,
             contacts: control.point_count,
             batches: control.batch_count,
             batch_rounds: control.rounds,

@@ -66,6 +66,7 @@ pub fn collider_bounds(collider: &Collider, state: &BodyState, props: &BodyProps
     let body = collider.body
         | aabb_body::LIVE
         | if dynamic { aabb_body::DYNAMIC } else { 0 }
+        | if state.flags & body_flags::ASLEEP != 0 { aabb_body::ASLEEP } else { 0 }
         | if fixed { aabb_body::FIXED } else { 0 };
     let rotation = quat(state.rotation);
     let offset = rotate(rotation, vec3(collider.position));

@@ -19,6 +19,7 @@ pub mod primitives;
 mod query;
 pub mod readback;
 pub mod recorder;
+mod sleep;
 mod solver;
 mod stages;
 mod store;

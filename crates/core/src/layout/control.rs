@@ -25,7 +25,7 @@ pub mod overflow {
     pub const SWEEP: u32 = 5;
 }
 
-/// Counters and decisions of a step, kept where the passes run. 464 bytes.
+/// Counters and decisions of a step, kept where the passes run. 480 bytes.
 ///
 /// Everything from `pair_count` on is written anew each step. `stop` is sticky: raised in the plan phase, cleared by
 /// the host when the buffer has grown.
@@ -107,4 +107,10 @@ pub struct Control {
     pub asleep: u32,
     /// Islands asleep.
     pub islands_asleep: u32,
+    /// Bodies awake that contacts can push, and kinematic ones that move; where bodies may sleep.
+    pub awake: u32,
+    /// Manifolds with points of those asleep, which are no constraints of the step.
+    pub manifolds_asleep: u32,
+    /// Unused.
+    pub pad_c: [u32; 2],
 }

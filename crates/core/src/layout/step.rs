@@ -1,6 +1,6 @@
 use bytemuck::{Pod, Zeroable};
 
-/// What one step is told, as a uniform. 112 bytes.
+/// What one step is told, as a uniform. 128 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct StepParams {
@@ -56,4 +56,12 @@ pub struct StepParams {
     pub static_mass_scale: f32,
     /// `impulse_scale` of those.
     pub static_impulse_scale: f32,
+    /// How far a point of a body's surface may stray while the body is at rest, m; below 0 where nothing sleeps.
+    pub sleep_distance: f32,
+    /// How long all bodies of an island must have been at rest before it sleeps, s.
+    pub sleep_time: f32,
+    /// 1 when all who sleep wake.
+    pub wake_all: u32,
+    /// Unused.
+    pub pad_a: u32,
 }

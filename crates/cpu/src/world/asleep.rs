@@ -65,8 +65,7 @@ impl Sums {
     fn add_to(&self, control: &mut Control) {
         control.pair_count += self.pairs;
         control.processed += self.pairs;
-        control.constraint_count += self.manifolds;
-        control.solved += self.manifolds;
+        control.manifolds_asleep += self.manifolds;
         control.point_count += self.points;
     }
 }
