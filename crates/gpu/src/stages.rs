@@ -65,15 +65,16 @@ impl Stages {
     /// Records one step: the plan phase up to the second gate, then the commit phase, whose passes do nothing once the
     /// stop flag is up.
     pub(crate) fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
+        let may_sleep = step.sleep_distance >= 0.0;
         self.edit.record(recorder, step)?;
-        if let Some(sleep) = &self.sleep {
+        if let Some(sleep) = self.sleep.as_ref().filter(|_| may_sleep || step.wake_all != 0) {
             sleep.record_edits(recorder, buffers, step)?;
         }
         self.bounds.record(recorder, step)?;
         self.broadphase.record(recorder, buffers, step)?;
         self.contact.record_match(recorder, buffers)?;
         self.narrowphase.record(recorder, self.contact.a_pair())?;
-        if let Some(sleep) = &self.sleep {
+        if let Some(sleep) = self.sleep.as_ref().filter(|_| may_sleep) {
             sleep.record_touch(recorder, step, self.contact.a_pair())?;
         }
         self.batch.record(recorder, buffers, step, self.contact.a_pair())?;
@@ -81,7 +82,7 @@ impl Stages {
         self.solver.record(recorder, buffers, &self.motion, step)?;
         self.contact.record_commit(recorder, buffers)?;
         self.motion.record_commit(recorder, step)?;
-        if let Some(sleep) = &self.sleep {
+        if let Some(sleep) = self.sleep.as_ref().filter(|_| may_sleep) {
             sleep.record_settle(recorder, step)?;
         }
         self.motion.record_poses(recorder, step)?;

@@ -266,7 +266,7 @@ impl World {
         step.drop_pair = std::mem::replace(&mut self.drop_pair, u32::MAX);
         let [x, y, z] = step.gravity;
         let told = self.params.sleep.map(|_| [x, y, z, step.speculative_distance].map(f32::to_bits));
-        step.wake_all = u32::from(told.is_none() || told != self.told);
+        step.wake_all = u32::from(told != self.told);
         self.told = told;
         if step.wake_all != 0 || !edits.records.is_empty() {
             self.disturbed = step.step;
