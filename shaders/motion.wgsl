@@ -3,6 +3,7 @@
 //
 //   integrate_velocities   velocities in `solver_bodies`, from `work_states` (forces) and `props`
 //   integrate_positions    translation and delta there
+//   first_substep, next_substep, last_substep   both, as one pass wants it
 //   commit                 `states` from `solver_bodies` and `work_states`; counts and names bodies in quarantine
 //   write_poses            `poses`, the bodies' own frames for users and renderers, from `states` and `props`
 //
@@ -21,6 +22,10 @@ const MAX_TURN: f32 = 32.0;
 const STILL: u32 = BODY_FROZEN | BODY_ASLEEP;
 // Beyond this a velocity (m/s, rad/s) or position (m) is taken for what it is: an explosion.
 const STATE_LIMIT: f32 = 1e9;
+// Share of a body's eigenvalue that comes from its neighbours.
+const EASE_MIX: f32 = 0.95;
+// No eigenvalue is larger.
+const MAX_EIGENVALUE: f32 = 4.0;
 const COUNTER_FROZEN_COUNT: u32 = 108u; // scratch word of the counters
 
 @group(0) @binding(0) var<uniform> control: Control;
@@ -38,14 +43,8 @@ fn acceleration(i: u32) -> vec3<f32> {
 }
 
 // Gravity, force, torque and damping over one sub-step.
-@compute @workgroup_size(256)
-fn integrate_velocities(
-    @builtin(workgroup_id) wg: vec3<u32>,
-    @builtin(num_workgroups) num: vec3<u32>,
-    @builtin(local_invocation_index) lid: u32,
-) {
-    let i = invocation(wg, num, lid);
-    if i >= step.body_count || control.stop != 0u || !moves(work_states[i].flags) {
+fn integrate_velocity(i: u32) {
+    if !moves(work_states[i].flags) {
         return;
     }
     let linear = solver_bodies[i].linear_velocity + acceleration(i) * step.h;
@@ -57,6 +56,18 @@ fn integrate_velocities(
     );
     let angular = solver_bodies[i].angular_velocity + turn * step.h;
     solver_bodies[i].angular_velocity = angular * (1.0 / (1.0 + step.h * props[i].angular_damping));
+}
+
+@compute @workgroup_size(256)
+fn integrate_velocities(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i < step.body_count && control.stop == 0u {
+        integrate_velocity(i);
+    }
 }
 
 // Solves I (w1 - w0) + h m x I m = 0, m = (w0 + w1) / 2, for w1.
@@ -136,16 +147,7 @@ fn turn(i: u32, h: f32) {
 //
 // A body that no constraint touches falls by the mean of its old and new velocity (gravity in two half kicks: exact for
 // a constant force). One that is touched moves by the velocity that its contacts were solved for.
-@compute @workgroup_size(256)
-fn integrate_positions(
-    @builtin(workgroup_id) wg: vec3<u32>,
-    @builtin(num_workgroups) num: vec3<u32>,
-    @builtin(local_invocation_index) lid: u32,
-) {
-    let i = invocation(wg, num, lid);
-    if i >= step.body_count || control.stop != 0u {
-        return;
-    }
+fn integrate_position(i: u32) {
     let kind = work_states[i].flags & BODY_KIND;
     if kind == BODY_NONE || kind == BODY_FIXED || (work_states[i].flags & STILL) != 0u {
         return;
@@ -156,6 +158,90 @@ fn integrate_positions(
     }
     solver_bodies[i].translation = solver_bodies[i].translation + way;
     turn(i, step.h);
+}
+
+@compute @workgroup_size(256)
+fn integrate_positions(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i < step.body_count && control.stop == 0u {
+        integrate_position(i);
+    }
+}
+
+fn start(i: u32) {
+    integrate_velocity(i);
+    solver_bodies[i].linear_start = solver_bodies[i].linear_velocity;
+    solver_bodies[i].angular_start = solver_bodies[i].angular_velocity;
+}
+
+// One pass: velocities before the first sub-step's impulses.
+@compute @workgroup_size(256)
+fn first_substep(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i < step.body_count && control.stop == 0u {
+        start(i);
+    }
+}
+
+// One pass: moves the body, and starts the next sub-step with the impulses of this one: what they added to the
+// velocity, they will add again.
+@compute @workgroup_size(256)
+fn next_substep(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i >= step.body_count || control.stop != 0u {
+        return;
+    }
+    let linear = solver_bodies[i].linear_velocity - solver_bodies[i].linear_start;
+    let angular = solver_bodies[i].angular_velocity - solver_bodies[i].angular_start;
+    integrate_position(i);
+    start(i);
+    if solver_bodies[i].inverse_mass > 0.0 {
+        solver_bodies[i].linear_velocity = solver_bodies[i].linear_velocity + linear;
+        solver_bodies[i].angular_velocity = solver_bodies[i].angular_velocity + angular;
+    }
+}
+
+// The body's eigenvalue anew, once its last sub-step is solved: its own quotient, mixed with those beside it.
+fn ease(i: u32) -> f32 {
+    let body = solver_bodies[i];
+    if body.inverse_mass == 0.0 || body.weight == 0.0 {
+        return 0.0;
+    }
+    let dv = body.linear_velocity - body.linear_start;
+    let turned = multiply(body.delta, work_states[i].rotation);
+    let dw = rotate_back(turned, body.angular_velocity - body.angular_start);
+    let lift = dot(dv, dv) / body.inverse_mass + dot(props[i].inertia * dw, dw);
+    let eased = ((1.0 - EASE_MIX) * lift + EASE_MIX * body.weighted) / body.weight;
+    if is_finite_bits(eased) {
+        return min(eased, MAX_EIGENVALUE);
+    }
+    return 0.0;
+}
+
+// One pass: takes down how soft the load on the body is, and moves it.
+@compute @workgroup_size(256)
+fn last_substep(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i < step.body_count && control.stop == 0u {
+        solver_bodies[i].eigenvalue = ease(i);
+        integrate_position(i);
+    }
 }
 
 fn small(v: vec3<f32>) -> bool {
@@ -187,6 +273,7 @@ fn commit(
             state.rotation = unit(multiply(body.delta, state.rotation));
             state.linear_velocity = body.linear_velocity;
             state.angular_velocity = body.angular_velocity;
+            state.eigenvalue = body.eigenvalue;
         } else {
             state.flags |= BODY_FROZEN;
             state.linear_velocity = vec3<f32>();

@@ -67,7 +67,8 @@ fn rust_field(owner: &str, field: &str, offset: usize, bytes: usize, type_name: 
 fn rust_layouts() -> BTreeMap<&'static str, Layout> {
     BTreeMap::from_iter(layouts! {
         BodyState {
-            position, flags, rotation, linear_velocity, generation, angular_velocity, pad_a, force, pad_b, torque, pad_c
+            position, flags, rotation, linear_velocity, generation, angular_velocity, pad_a, force, pad_b, torque,
+            eigenvalue
         }
         BodyProps {
             inverse_inertia, inverse_mass, inertia, gravity_scale, center_of_mass, linear_damping, frame,
@@ -75,8 +76,8 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         }
         Rest { position, time, rotation, island, pad_a, pad_b, pad_c }
         SolverBody {
-            linear_velocity, inverse_mass, angular_velocity, touched, translation, pad_a, delta,
-            inverse_inertia_diagonal, pad_b, inverse_inertia_off, pad_c
+            linear_velocity, inverse_mass, angular_velocity, touched, translation, eigenvalue, delta,
+            inverse_inertia_diagonal, pad_b, inverse_inertia_off, pad_c, linear_start, weight, angular_start, weighted
         }
         PoseRecord { translation, tag, rotation }
         Collider { size, shape, position, body, rotation, friction, restitution, combine, born }
@@ -86,12 +87,14 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         Manifold { normal, count, features, between, recycled, points }
         FoundManifold { rotation_a, rotation_b, manifold }
         ConstraintHead {
-            normal, friction, body_a, body_b, slot, count, restitution, bias_rate, mass_scale, impulse_scale
+            normal, friction, body_a, body_b, slot, count, restitution, bias_rate, mass_scale, impulse_scale,
+            remembered, round_a, round_b, pad_a
         }
         ConstraintPoint {
             anchor_a, adjusted_separation, anchor_b, normal_mass, tangent_mass, approach, max_impulse, pad_a
         }
         Impulse { normal, tangent, feature }
+        ManifoldMemory { remembered, pad_a, pad_b, pad_c }
         Control {
             stop, overflow, needed, step, old_pair_count, free_count, recolor, frozen_count, pair_count, processed,
             new_count, dead_count, constraint_count, point_count, batch_count, rounds, unplaced, last_count,
@@ -113,7 +116,8 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             dt, h, inverse_h, substeps, gravity, step, bias_rate, mass_scale, impulse_scale, push_speed,
             speculative_distance, restitution_threshold, body_count, collider_count, pair_capacity, cell_table_bits,
             large_limit, edit_ranges, drop_pair, write_poses, batch_rounds, last_limit, wide_batches,
-            static_bias_rate, static_mass_scale, static_impulse_scale, sleep_distance, sleep_time, wake_all, pad_a
+            static_bias_rate, static_mass_scale, static_impulse_scale, memory_gain, memory_limit,
+            memory_band, blow_speed, solver, sleep_distance, sleep_time, wake_all
         }
     })
 }
@@ -132,6 +136,7 @@ macro_rules! constants {
 fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
     constants! {
         body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN, ASLEEP, STAYS_AWAKE }
+        solver as "SOLVER_" { ONE_PASS, SOFT }
         shape_kind as "SHAPE_" { NONE, BALL, CUBOID, HALFSPACE }
         aabb_body as "AABB_" { INDEX, FIXED, DYNAMIC, LIVE, ASLEEP }
         pair_kind as "PAIR_" {

@@ -32,9 +32,18 @@ mod off {
     pub(crate) const WAY: Field = ("translation", 1e-6); // 0
     pub(crate) const TURN: Field = ("turn", 1e-5); // 1.2e-6
     pub(crate) const TURNED: Field = ("turned velocity", 1e-5); // 8.9e-7
+    pub(crate) const EIGENVALUE: Field = ("eigenvalue", 1e-4);
     pub(crate) const ROTATION: Field = ("rotation", 1e-6); // 1.2e-7
     pub(crate) const POSE: Field = ("pose", 1e-6); // 1.2e-7
 }
+
+/// The passes of one pass, and what they do on the CPU.
+type BodyPass = fn(&mut SolverBody, &BodyState, &BodyProps, &StepParams);
+const ONE_PASS: [(&str, BodyPass); 3] = [
+    ("first_substep", motion::first_substep),
+    ("next_substep", motion::next_substep),
+    ("last_substep", motion::last_substep),
+];
 
 #[test]
 fn bodies_are_integrated_alike() {
@@ -42,6 +51,7 @@ fn bodies_are_integrated_alike() {
     let mut floats = Floats::default();
     for (what, mut stage) in Stage::all() {
         stage.advance();
+        let calm = stage.bodies.clone();
         // Turns of some radians a sub-step, of too many, and of no number at all.
         for (i, body) in stage.bodies.iter_mut().enumerate() {
             match i % 32 {
@@ -75,6 +85,24 @@ fn bodies_are_integrated_alike() {
             floats.check(&what, off::WAY, (&bodies, &gpu), |b| b.translation);
             floats.check(&what, off::TURN, (&bodies, &gpu), |b| b.delta);
             floats.check(&what, off::TURNED, (&bodies, &gpu), |b| b.angular_velocity);
+
+            for (entry, pass) in ONE_PASS {
+                let mut bodies = calm.clone();
+                alone.put("solver_bodies", &bodies);
+                for (i, body) in bodies.iter_mut().enumerate() {
+                    pass(body, &frame.states[i], &cpu.props[i], &frame.step);
+                }
+                alone.run(|chain| chain.pass("motion", entry, stage.by_body()));
+                let gpu: Vec<SolverBody> = alone.take("solver_bodies");
+                let what = format!("{what}, {entry}");
+                floats.check(&what, off::VELOCITY, (&bodies, &gpu), |b| b.linear_velocity);
+                floats.check(&what, off::TURNED, (&bodies, &gpu), |b| b.angular_velocity);
+                floats.check(&what, off::VELOCITY, (&bodies, &gpu), |b| b.linear_start);
+                floats.check(&what, off::TURNED, (&bodies, &gpu), |b| b.angular_start);
+                floats.check(&what, off::WAY, (&bodies, &gpu), |b| b.translation);
+                floats.check(&what, off::TURN, (&bodies, &gpu), |b| b.delta);
+                floats.check(&what, off::EIGENVALUE, (&bodies, &gpu), |b| [b.eigenvalue]);
+            }
         }
     }
     eprintln!("motion\n{floats}");

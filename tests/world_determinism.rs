@@ -13,8 +13,8 @@ use common::gpu;
 use frame::{Cpu, scene_of};
 use tumble::World;
 use tumble_core::glam::Vec3;
-use tumble_core::layout::{Impulse, SolverBody};
-use tumble_core::{ColliderBuilder, Params, RigidBodyBuilder, Scene, measures, scenes};
+use tumble_core::layout::{ConstraintHead, Impulse, SolverBody};
+use tumble_core::{ColliderBuilder, OnePass, Params, RigidBodyBuilder, Scene, Soft, Solver, measures, scenes};
 use tumble_cpu::solver::{Bodies, Rows, solve, solve_plain};
 use tumble_gpu::Pipelines;
 use worlds::{SIDES, hash, report, steps};
@@ -141,8 +141,9 @@ fn four_at_a_time() {
         ("hub", scenes::hub(200), 5),
         ("pyramid", scenes::pyramid(15), 5),
     ];
-    for (name, scene, count) in scenes {
-        let cpu = Cpu::after(&scene, count);
+    let solvers = [Solver::OnePass(OnePass::default()), Solver::Soft(Soft::default())];
+    for ((name, scene, count), solver) in scenes.iter().flat_map(|scene| solvers.map(|solver| (scene, solver))) {
+        let cpu = Cpu::after_by(solver, scene, *count);
         for recolor in [false, true] {
             let frame = cpu.plan(recolor);
             let (start, order) = (&frame.batches.start, &frame.batches.order);
@@ -153,7 +154,11 @@ fn four_at_a_time() {
                 let moving = Bodies { solver: &mut bodies, states: &frame.states, props: &cpu.props };
                 solve_plain(&mut rows, moving, &frame.step, true);
                 let used = rows.heads.iter().zip(rows.impulses.chunks_exact(4));
-                (bodies, used.map(|(head, own)| own[..head.count as usize].iter().map(bits).collect()).collect())
+                let memory = |head: &ConstraintHead| [head.remembered.to_bits(), 0, 0];
+                let all = |(head, own): (&ConstraintHead, &[Impulse])| {
+                    own[..head.count as usize].iter().map(bits).chain([memory(head)]).collect()
+                };
+                (bodies, used.map(all).collect())
             };
             let lanes: Solved = {
                 let mut bodies = cpu.bodies(&frame);
@@ -162,20 +167,29 @@ fn four_at_a_time() {
                 let moving = Bodies { solver: &mut bodies, states: &frame.states, props: &cpu.props };
                 solve(&mut rows, moving, &frame.step, true);
                 let used = std::sync::Mutex::new(vec![Vec::new(); order.len()]);
-                rows.for_each_constraint(|c, solved| {
+                rows.for_each_constraint(|c, remembered, solved| {
                     let count = frame.manifolds[order[c] as usize].count as usize;
-                    let own = solved[..count].iter().map(|s| [s.0, s.1[0], s.1[1]].map(f32::to_bits)).collect();
+                    let memory = [remembered.to_bits(), 0, 0];
+                    let own = solved[..count]
+                        .iter()
+                        .map(|s| [s.0, s.1[0], s.1[1]].map(f32::to_bits))
+                        .chain([memory])
+                        .collect();
                     used.lock().unwrap()[c] = own;
                 });
                 let used = used.into_inner().unwrap();
                 (bodies, used)
             };
             for (i, (four, one)) in lanes.0.iter().zip(&plain.0).enumerate() {
-                assert_eq!(bytemuck::bytes_of(four), bytemuck::bytes_of(one), "{name}: body {i}: {four:?} {one:?}");
+                assert_eq!(
+                    bytemuck::bytes_of(four),
+                    bytemuck::bytes_of(one),
+                    "{name}, {solver}: body {i}: {four:?} {one:?}"
+                );
             }
-            assert_eq!(lanes.1, plain.1, "{name}");
+            assert_eq!(lanes.1, plain.1, "{name}, {solver}");
             let last = start[start.len() - 1] - start[start.len() - 2];
-            assert_eq!(last > 0, name == "hub", "{name}: {last} in the last batch");
+            assert_eq!(last > 0, *name == "hub", "{name}: {last} in the last batch");
         }
     }
 }

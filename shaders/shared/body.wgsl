@@ -21,7 +21,7 @@ struct BodyState {
     force: vec3<f32>,
     pad_b: u32,
     torque: vec3<f32>,
-    pad_c: u32,
+    eigenvalue: f32,
 }
 
 struct BodyProps {
@@ -54,12 +54,16 @@ struct SolverBody {
     angular_velocity: vec3<f32>,
     touched: u32,
     translation: vec3<f32>,
-    pad_a: u32,
+    eigenvalue: f32,
     delta: vec4<f32>,
     inverse_inertia_diagonal: vec3<f32>,
     pad_b: u32,
     inverse_inertia_off: vec3<f32>,
     pad_c: u32,
+    linear_start: vec3<f32>,
+    weight: f32,
+    angular_start: vec3<f32>,
+    weighted: f32,
 }
 
 struct PoseRecord {

@@ -11,6 +11,10 @@ struct ConstraintHead {
     bias_rate: f32,
     mass_scale: f32,
     impulse_scale: f32,
+    remembered: f32,
+    round_a: f32,
+    round_b: f32,
+    pad_a: u32,
 }
 
 struct ConstraintPoint {
@@ -29,4 +33,11 @@ struct Impulse {
     normal: f32,
     tangent: array<f32, 2>,
     feature: u32,
+}
+
+struct ManifoldMemory {
+    remembered: f32,
+    pad_a: u32,
+    pad_b: u32,
+    pad_c: u32,
 }

@@ -1,5 +1,8 @@
 // What one step is told, as a uniform. Fields and units: crates/core/src/layout/step.rs.
 
+const SOLVER_ONE_PASS: u32 = 0u;
+const SOLVER_SOFT: u32 = 1u;
+
 struct StepParams {
     dt: f32,
     h: f32,
@@ -27,8 +30,12 @@ struct StepParams {
     static_bias_rate: f32,
     static_mass_scale: f32,
     static_impulse_scale: f32,
+    memory_gain: f32,
+    memory_limit: f32,
+    memory_band: f32,
+    blow_speed: f32,
+    solver: u32,
     sleep_distance: f32,
     sleep_time: f32,
     wake_all: u32,
-    pad_a: u32,
 }

@@ -1,10 +1,11 @@
-// The sweeps over constraints, batch by batch; the law of a visit is in `solver/soft`.
+// The sweeps over constraints, batch by batch; the laws of a visit are in `solver/soft` and `solver/one_pass`.
 // Twin of crates/cpu/src/solver/mod.rs (`PlainRows::sweep`).
 //
-// Reads `heads`; reads and writes `points`, `impulses` and the velocities in `solver_bodies`. Constraints of one batch
-// share no moving body, so each has a thread of its own:
+// Reads and writes `heads` (what they remember), `points`, `impulses` and `solver_bodies` (velocities, and what the
+// sub-step began with). Constraints of one batch share no moving body, so each has a thread of its own:
 //
-//   warm_start, solve, relax, restitution   one batch a dispatch (`batch`), one thread a constraint
+//   warm_start, solve, relax (soft), load, one_pass (one pass), restitution
+//              one batch a dispatch (`batch`), one thread a constraint
 //   ..._tail   one workgroup: the batches from `step.wide_batches` on, one after the other, one thread each 256th
 //              constraint; the last batch, whose constraints do share bodies, in order: each thread in turn visits 128
 //
@@ -13,6 +14,7 @@
 
 //#import shared/control.wgsl
 //#import shared/thread.wgsl
+//#import solver/one_pass.wgsl
 //#import solver/soft.wgsl
 
 struct BatchIndex {
@@ -25,10 +27,14 @@ struct BatchIndex {
 @group(0) @binding(0) var<uniform> control: Control;
 @group(0) @binding(1) var<uniform> step: StepParams;
 @group(0) @binding(2) var<uniform> batch: BatchIndex;
-@group(0) @binding(3) var<storage, read> heads: array<ConstraintHead>;
+@group(0) @binding(3) var<storage, read_write> heads: array<ConstraintHead>;
 @group(0) @binding(4) var<storage, read_write> points: array<ConstraintPoint>;
 @group(0) @binding(5) var<storage, read_write> impulses: array<Impulse>;
 @group(0) @binding(6) var<storage, read_write> solver_bodies: array<SolverBody>;
+
+// Kinds of visit of the one pass; the others are in `solver/soft`.
+const LOAD: u32 = 4u;
+const PASS: u32 = 5u;
 
 const SOLVER_WORKGROUP: u32 = 64u;
 const TURN: u32 = 128u; // constraints of the last batch that one thread visits in a row
@@ -96,6 +102,114 @@ fn visit(kind: u32, c: u32) {
     }
 }
 
+// Applies the impulses of the last step to constraint c, and weighs the eigenvalues of its bodies with them.
+fn load_constraint(c: u32) {
+    let head = heads[c];
+    var a = solver_bodies[head.body_a];
+    var b = solver_bodies[head.body_b];
+    let t = tangents(head.normal);
+    let first = 4u * c;
+    let end = first + min(head.count, 4u);
+    var weight = 0.0;
+    var p = first;
+    loop {
+        var point = points[p];
+        var impulse = impulses[p];
+        warm_start_point(head.normal, t, &point, &impulse, &a, &b);
+        weight += weight_of(&point, &impulse);
+        continuing {
+            p++;
+            break if p >= end;
+        }
+    }
+    let own = eigenvalues(&a, &b);
+    if a.inverse_mass > 0.0 {
+        solver_bodies[head.body_a].linear_velocity = a.linear_velocity;
+        solver_bodies[head.body_a].angular_velocity = a.angular_velocity;
+        solver_bodies[head.body_a].weight = a.weight + weight;
+        solver_bodies[head.body_a].weighted = a.weighted + weight * own.y;
+    }
+    if b.inverse_mass > 0.0 {
+        solver_bodies[head.body_b].linear_velocity = b.linear_velocity;
+        solver_bodies[head.body_b].angular_velocity = b.angular_velocity;
+        solver_bodies[head.body_b].weight = b.weight + weight;
+        solver_bodies[head.body_b].weighted = b.weighted + weight * own.x;
+    }
+}
+
+// All that one pass does to constraint c in a sub-step: normals first, then friction, then the memory; and blows are put
+// aside.
+fn pass_over(c: u32) {
+    let head = heads[c];
+    var a = solver_bodies[head.body_a];
+    var b = solver_bodies[head.body_b];
+    let t = tangents(head.normal);
+    let first = 4u * c;
+    let end = first + min(head.count, 4u);
+    var before: array<vec3<f32>, 4>;
+    var sum = 0.0;
+    var p = first;
+    loop {
+        var point = points[p];
+        var impulse = impulses[p];
+        before[p - first] = vec3<f32>(impulse.normal, impulse.tangent[0], impulse.tangent[1]);
+        let highest = point.max_impulse;
+        pass_normal(head, &point, &impulse, &a, &b, step);
+        sum += impulse.normal;
+        impulses[p].normal = impulse.normal;
+        if point.max_impulse > highest {
+            points[p].max_impulse = point.max_impulse;
+        }
+        if highest == 0.0 {
+            points[p].approach = point.approach;
+        }
+        continuing {
+            p++;
+            break if p >= end;
+        }
+    }
+    var blown = false;
+    p = first;
+    loop {
+        var point = points[p];
+        var impulse = impulses[p];
+        push_tangent(head.friction, t, &point, &impulse, &a, &b);
+        let was = before[p - first];
+        let blow = impulse.normal - was.x;
+        if blow > step.blow_speed * point.normal_mass {
+            // It is given once: the next sub-step starts without it.
+            let x = impulse.tangent[0] - was.y;
+            let y = impulse.tangent[1] - was.z;
+            start_after(&point, blow * head.normal + x * t[0] + y * t[1], &a, &b);
+            impulse.tangent = array<f32, 2>(was.y, was.z);
+            impulses[p].normal = was.x;
+            blown = true;
+        }
+        impulses[p].tangent = impulse.tangent;
+        continuing {
+            p++;
+            break if p >= end;
+        }
+    }
+    heads[c].remembered = remember(head, sum, &a, &b, step);
+    if a.inverse_mass > 0.0 {
+        solver_bodies[head.body_a].linear_velocity = a.linear_velocity;
+        solver_bodies[head.body_a].angular_velocity = a.angular_velocity;
+        if blown {
+            solver_bodies[head.body_a].linear_start = a.linear_start;
+            solver_bodies[head.body_a].angular_start = a.angular_start;
+        }
+    }
+    if b.inverse_mass > 0.0 {
+        solver_bodies[head.body_b].linear_velocity = b.linear_velocity;
+        solver_bodies[head.body_b].angular_velocity = b.angular_velocity;
+        if blown {
+            solver_bodies[head.body_b].linear_start = b.linear_start;
+            solver_bodies[head.body_b].angular_start = b.angular_start;
+        }
+    }
+}
+
 // Constraint of an invocation of the batch's dispatch, or NONE. Workgroups are smaller here than `invocation` takes
 // them to be.
 const NONE: u32 = 0xffffffffu;
@@ -148,6 +262,30 @@ fn relax(
 }
 
 @compute @workgroup_size(64)
+fn load(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let c = constraint_of(wg, num, lid);
+    if c != NONE {
+        load_constraint(c);
+    }
+}
+
+@compute @workgroup_size(64)
+fn one_pass(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let c = constraint_of(wg, num, lid);
+    if c != NONE {
+        pass_over(c);
+    }
+}
+
+@compute @workgroup_size(64)
 fn restitution(
     @builtin(workgroup_id) wg: vec3<u32>,
     @builtin(num_workgroups) num: vec3<u32>,
@@ -156,6 +294,16 @@ fn restitution(
     let c = constraint_of(wg, num, lid);
     if c != NONE {
         visit(RESTITUTION, c);
+    }
+}
+
+fn visit_any(kind: u32, c: u32) {
+    if kind == LOAD {
+        load_constraint(c);
+    } else if kind == PASS {
+        pass_over(c);
+    } else {
+        visit(kind, c);
     }
 }
 
@@ -171,7 +319,7 @@ fn tail(kind: u32, lid: u32) {
             continue;
         }
         for (var c = start_of(index) + local; c < end; c += WORKGROUP) {
-            visit(kind, c);
+            visit_any(kind, c);
         }
         storageBarrier();
     }
@@ -180,7 +328,7 @@ fn tail(kind: u32, lid: u32) {
     for (var turn = 0u; turn < (end - first + TURN - 1u) / TURN; turn++) {
         if local == turn % WORKGROUP {
             for (var c = first + turn * TURN; c < min(first + (turn + 1u) * TURN, end); c++) {
-                visit(kind, c);
+                visit_any(kind, c);
             }
         }
         storageBarrier();
@@ -200,6 +348,16 @@ fn solve_tail(@builtin(local_invocation_index) lid: u32) {
 @compute @workgroup_size(256)
 fn relax_tail(@builtin(local_invocation_index) lid: u32) {
     tail(RELAX, lid);
+}
+
+@compute @workgroup_size(256)
+fn load_tail(@builtin(local_invocation_index) lid: u32) {
+    tail(LOAD, lid);
+}
+
+@compute @workgroup_size(256)
+fn one_pass_tail(@builtin(local_invocation_index) lid: u32) {
+    tail(PASS, lid);
 }
 
 @compute @workgroup_size(256)

@@ -2,7 +2,7 @@
 //
 //   bodies        one thread a body: `solver_bodies` from `work_states`, `props` and `masks` (the batches it is in)
 //   constraints   one thread a constraint, in batch order: `heads` and `points` from the manifold of its pair
-//   carry         the same: `impulses`, those of `slot_impulses` for points whose features stayed
+//   carry         the same: `impulses`, those of `slot_impulses` for points whose features stayed; `slot_memory`
 //
 // The masses that a point sees are as in Catto, "Iterative Dynamics with Temporal Coherence" (GDC 2005).
 
@@ -15,6 +15,8 @@
 //#import shared/pair.wgsl
 //#import shared/step.wgsl
 //#import shared/thread.wgsl
+
+const NO_FEATURE: u32 = 0xffffffffu;
 
 @group(0) @binding(0) var<uniform> control: Control;
 @group(0) @binding(1) var<uniform> step: StepParams;
@@ -30,6 +32,7 @@
 @group(0) @binding(11) var<storage, read_write> heads: array<ConstraintHead>;
 @group(0) @binding(12) var<storage, read_write> points: array<ConstraintPoint>;
 @group(0) @binding(13) var<storage, read_write> impulses: array<Impulse>;
+@group(0) @binding(14) var<storage, read> slot_memory: array<ManifoldMemory>;
 
 // A body as the solver moves it; what nothing may push has no mass and keeps its velocity.
 fn prepare_body(i: u32) -> SolverBody {
@@ -37,6 +40,7 @@ fn prepare_body(i: u32) -> SolverBody {
     body.linear_velocity = work_states[i].linear_velocity;
     body.angular_velocity = work_states[i].angular_velocity;
     body.touched = select(0u, 1u, (masks[2u * i] | masks[2u * i + 1u]) != 0u);
+    body.eigenvalue = work_states[i].eigenvalue;
     body.delta = vec4<f32>(0.0, 0.0, 0.0, 1.0);
     if moves(work_states[i].flags) {
         body.inverse_mass = props[i].inverse_mass;
@@ -112,6 +116,14 @@ fn inverse(x: f32) -> f32 {
     return 0.0;
 }
 
+// Part of an arm that does not turn with its body: from the centre of a ball to midway between the surfaces, m.
+fn round_part(collider: u32, separation: f32) -> f32 {
+    if colliders[collider].shape == SHAPE_BALL {
+        return colliders[collider].size.x + 0.5 * separation;
+    }
+    return 0.0;
+}
+
 @compute @workgroup_size(256)
 fn constraints(
     @builtin(workgroup_id) wg: vec3<u32>,
@@ -132,6 +144,8 @@ fn constraints(
     let count = manifolds[index].count;
     let t = tangents(normal);
     let between = manifolds[index].between;
+    let round_a = round_part(pair.a, manifolds[index].points[0].separation);
+    let round_b = -round_part(pair.b, manifolds[index].points[0].separation);
     for (var i = 0u; i < min(count, 4u); i++) {
         let point = manifolds[index].points[i];
         let ra = point.anchor;
@@ -144,7 +158,7 @@ fn constraints(
         let dv = point_velocity(b, rb) - point_velocity(a, ra);
         points[4u * c + i] = ConstraintPoint(
             ra,
-            point.separation - dot(normal, rb - ra),
+            point.separation - (dot(normal, rb - ra) - (round_b - round_a)),
             rb,
             inverse(response(a, b, ra, rb, normal, normal)),
             inverse(stiffest),
@@ -180,6 +194,8 @@ fn constraints(
         head.mass_scale = step.static_mass_scale;
         head.impulse_scale = step.static_impulse_scale;
     }
+    head.round_a = round_a;
+    head.round_b = round_b;
     heads[c] = head;
 }
 
@@ -202,6 +218,9 @@ fn carry(
         slot_impulses[first + 2u].feature,
         slot_impulses[first + 3u].feature,
     );
+    if !fresh && stored.x != NO_FEATURE {
+        heads[c].remembered = slot_memory[next_pairs[index].slot].remembered / f32(manifolds[index].count);
+    }
     for (var i = 0u; i < min(manifolds[index].count, 4u); i++) {
         var impulse: Impulse;
         impulse.feature = manifolds[index].features[i];

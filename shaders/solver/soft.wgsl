@@ -1,60 +1,15 @@
-// The law of one visit: soft contacts with a friction cone. Twin of crates/cpu/src/solver/soft.rs. No pass, no binding;
-// `solver/passes` visits the points of a constraint with it.
+// Soft contacts: springs in the solve visit, rigid in the relax visit. Twin of crates/cpu/src/solver/soft.rs. No pass, no
+// binding.
 //
-// Catto, "Soft Constraints" (GDC 2011) and "Solver2D" (2024): a contact is a damped spring in the solve visit, and
-// rigid in the relax visit. Each push is checked before it is done: one that is not finite is dropped.
+// Catto, "Soft Constraints" (GDC 2011) and "Solver2D" (2024).
 
-//#import shared/body.wgsl
-//#import shared/constraint.wgsl
-//#import shared/math.wgsl
-//#import shared/step.wgsl
+//#import solver/push.wgsl
 
 // What a visit to a constraint does.
 const WARM_START: u32 = 0u; // applies the impulses of the last visit
 const SOLVE: u32 = 1u; // soft
 const RELAX: u32 = 2u; // rigid, no bias
 const RESTITUTION: u32 = 3u; // bounces
-
-fn inverse_inertia_times(body: ptr<function, SolverBody>, v: vec3<f32>) -> vec3<f32> {
-    return symmetric_times((*body).inverse_inertia_diagonal, (*body).inverse_inertia_off, v);
-}
-
-fn relative_velocity(
-    a: ptr<function, SolverBody>,
-    b: ptr<function, SolverBody>,
-    ra: vec3<f32>,
-    rb: vec3<f32>,
-) -> vec3<f32> {
-    let at_a = (*a).linear_velocity + cross((*a).angular_velocity, ra);
-    let at_b = (*b).linear_velocity + cross((*b).angular_velocity, rb);
-    return at_b - at_a;
-}
-
-// Applies `push` to b at `rb` and its opposite to a at `ra`.
-fn apply(
-    a: ptr<function, SolverBody>,
-    b: ptr<function, SolverBody>,
-    ra: vec3<f32>,
-    rb: vec3<f32>,
-    push: vec3<f32>,
-) {
-    (*a).linear_velocity = (*a).linear_velocity - (*a).inverse_mass * push;
-    (*a).angular_velocity = (*a).angular_velocity - inverse_inertia_times(a, cross(ra, push));
-    (*b).linear_velocity = (*b).linear_velocity + (*b).inverse_mass * push;
-    (*b).angular_velocity = (*b).angular_velocity + inverse_inertia_times(b, cross(rb, push));
-}
-
-fn warm_start_point(
-    normal: vec3<f32>,
-    t: mat2x3<f32>,
-    point: ptr<function, ConstraintPoint>,
-    impulse: ptr<function, Impulse>,
-    a: ptr<function, SolverBody>,
-    b: ptr<function, SolverBody>,
-) {
-    let push = (*impulse).normal * normal + (*impulse).tangent[0] * t[0] + (*impulse).tangent[1] * t[1];
-    apply(a, b, (*point).anchor_a, (*point).anchor_b, push);
-}
 
 // A gap is closed no faster than it lasts; overlap is a damped spring when soft, and left alone when rigid.
 fn push_normal(
@@ -70,8 +25,7 @@ fn push_normal(
     let ra = (*point).anchor_a;
     let rb = (*point).anchor_b;
     let velocity = dot(normal, relative_velocity(a, b, ra, rb));
-    let moved = (*b).translation - (*a).translation + rotate((*b).delta, rb) - rotate((*a).delta, ra);
-    let separation = (*point).adjusted_separation + dot(normal, moved);
+    let separation = separation_of(head, point, a, b);
     var bias = 0.0;
     var mass_scale = 1.0;
     var impulse_scale = 0.0;
@@ -93,62 +47,6 @@ fn push_normal(
         let push = new_normal - (*impulse).normal;
         (*impulse).normal = new_normal;
         (*point).max_impulse = max((*point).max_impulse, new_normal);
-        apply(a, b, ra, rb, push * normal);
-    }
-}
-
-// Friction against the sliding velocity, within the cone.
-fn push_tangent(
-    friction: f32,
-    t: mat2x3<f32>,
-    point: ptr<function, ConstraintPoint>,
-    impulse: ptr<function, Impulse>,
-    a: ptr<function, SolverBody>,
-    b: ptr<function, SolverBody>,
-) {
-    let ra = (*point).anchor_a;
-    let rb = (*point).anchor_b;
-    let slide = relative_velocity(a, b, ra, rb);
-    var x = (*impulse).tangent[0] - (*point).tangent_mass * dot(t[0], slide);
-    var y = (*impulse).tangent[1] - (*point).tangent_mass * dot(t[1], slide);
-    let size = sqrt(x * x + y * y);
-    let most = friction * (*impulse).normal;
-    if size > most {
-        let scale = most / size;
-        x *= scale;
-        y *= scale;
-    }
-    let push = (x - (*impulse).tangent[0]) * t[0] + (y - (*impulse).tangent[1]) * t[1];
-    if is_finite3(push) {
-        (*impulse).tangent[0] = x;
-        (*impulse).tangent[1] = y;
-        apply(a, b, ra, rb, push);
-    }
-}
-
-// Gives back a share of the speed at which the points met, where they met fast enough and pushed at all.
-fn bounce(
-    restitution: f32,
-    normal: vec3<f32>,
-    point: ptr<function, ConstraintPoint>,
-    impulse: ptr<function, Impulse>,
-    a: ptr<function, SolverBody>,
-    b: ptr<function, SolverBody>,
-    step: StepParams,
-) {
-    let approach = (*point).approach;
-    if restitution == 0.0 || approach > -step.restitution_threshold || (*point).max_impulse == 0.0 {
-        return;
-    }
-    let ra = (*point).anchor_a;
-    let rb = (*point).anchor_b;
-    let velocity = dot(normal, relative_velocity(a, b, ra, rb));
-    let change = -(*point).normal_mass * (velocity + restitution * approach);
-    let sum = (*impulse).normal + change;
-    if is_finite_bits(sum) {
-        let new_normal = max(sum, 0.0);
-        let push = new_normal - (*impulse).normal;
-        (*impulse).normal = new_normal;
         apply(a, b, ra, rb, push * normal);
     }
 }

@@ -58,8 +58,10 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/tree", include_str!("../shared/tree.wgsl")),
     ("shared/workgroup", include_str!("../shared/workgroup.wgsl")),
     ("sleep", include_str!("../sleep.wgsl")),
+    ("solver/one_pass", include_str!("../solver/one_pass.wgsl")),
     ("solver/passes", include_str!("../solver/passes.wgsl")),
     ("solver/prepare", include_str!("../solver/prepare.wgsl")),
+    ("solver/push", include_str!("../solver/push.wgsl")),
     ("solver/soft", include_str!("../solver/soft.wgsl")),
     ("solver/store", include_str!("../solver/store.wgsl")),
 ];

@@ -5,7 +5,7 @@ use std::iter;
 use bytemuck::Zeroable;
 use tumble_core::glam::Vec3;
 use tumble_core::layout::*;
-use tumble_core::{PackedScene, Params, Scene, limits, scenes};
+use tumble_core::{PackedScene, Params, Scene, Solver, limits, scenes};
 use tumble_cpu::batch::{self, Batches, Ends};
 use tumble_cpu::broadphase::{Boxes, brute_force};
 use tumble_cpu::contact::{self, Matched, NO_FEATURE};
@@ -27,6 +27,8 @@ pub(crate) struct Cpu {
     pub(crate) batch_of_slot: Vec<u32>,
     /// Four a slot.
     pub(crate) impulses: Vec<Impulse>,
+    /// By slot.
+    pub(crate) memory: Vec<ManifoldMemory>,
     pub(crate) found: Vec<FoundManifold>,
 }
 
@@ -67,12 +69,14 @@ impl Cpu {
             free: Vec::new(),
             batch_of_slot: Vec::new(),
             impulses: Vec::new(),
+            memory: Vec::new(),
             found: Vec::new(),
         };
         let room = limits::initial_pairs(&cpu.params.capacities, cpu.colliders.len() as u32);
         cpu.free = (0..room).rev().collect();
         cpu.batch_of_slot = vec![UNBATCHED; room as usize];
         cpu.found = vec![FoundManifold::zeroed(); room as usize];
+        cpu.memory = vec![ManifoldMemory::default(); room as usize];
         cpu.impulses = vec![Impulse { normal: 0.0, tangent: [0.0; 2], feature: NO_FEATURE }; 4 * room as usize];
         for (i, (state, props)) in cpu.states.iter_mut().zip(&mut cpu.props).enumerate() {
             if state.flags != body_flags::DYNAMIC {
@@ -98,7 +102,13 @@ impl Cpu {
 
     /// The scene after so many steps.
     pub(crate) fn after(scene: &Scene, steps: u32) -> Self {
+        Self::after_by(Solver::default(), scene, steps)
+    }
+
+    /// The same by this solver.
+    pub(crate) fn after_by(solver: Solver, scene: &Scene, steps: u32) -> Self {
         let mut cpu = Self::new(scene);
+        cpu.params.solver = solver;
         for _ in 0..steps {
             let frame = cpu.plan(false);
             cpu.commit(&frame);
@@ -153,7 +163,8 @@ impl Cpu {
         let index = frame.batches.order[c] as usize;
         let pair = &frame.matched.pairs[index];
         let stored = &self.impulses[4 * pair.slot as usize..][..4];
-        Contact { pair, manifold: &frame.manifolds[index], stored }
+        let memory = &self.memory[pair.slot as usize];
+        Contact { pair, manifold: &frame.manifolds[index], stored, memory }
     }
 
     /// Impulses by slot as they are after `rows` were solved; slots without a constraint stay as they are.
@@ -168,6 +179,16 @@ impl Cpu {
             }
         }
         impulses
+    }
+
+    /// The same of what slots remember of manifolds.
+    pub(crate) fn remembered(&self, frame: &Frame, rows: &PlainRows) -> Vec<ManifoldMemory> {
+        let mut memory = self.memory.clone();
+        for (head, &index) in rows.heads.iter().zip(&frame.batches.order) {
+            let slot = frame.matched.pairs[index as usize].slot as usize;
+            memory[slot] = store::store_memory(&frame.manifolds[index as usize], head.remembered);
+        }
+        memory
     }
 
     /// Solves the step and keeps its result.
@@ -188,6 +209,7 @@ impl Cpu {
             contact::commit_pair(manifold, *batch, &mut self.batch_of_slot[slot], impulses);
         }
         self.impulses = self.stored(frame, &rows);
+        self.memory = self.remembered(frame, &rows);
         self.states = iter::zip(&bodies, &frame.states).map(|(b, s)| motion::commit(b, s).0).collect();
         self.pairs = frame.matched.pairs.clone();
         self.number += 1;

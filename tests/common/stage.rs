@@ -2,7 +2,7 @@
 
 use bytemuck::Zeroable;
 use tumble_core::layout::*;
-use tumble_core::{Scene, scenes};
+use tumble_core::{OnePass, Scene, Soft, Solver, scenes};
 use tumble_cpu::solver::{Bodies, PlainRows, Visit, solve_plain};
 
 use crate::alone::{Alone, Chain};
@@ -11,12 +11,21 @@ use crate::frame::{Cpu, Frame, control_of, scene_of};
 pub(crate) const PERMUTATIONS: [u32; 3] = [0, 1, 2];
 pub(crate) const SIZES: [usize; 7] = [0, 1, 2, 255, 256, 257, 3000];
 /// Visits, and the passes that make them.
-pub(crate) const VISITS: [(Visit, &str, &str); 4] = [
-    (Visit::WarmStart, "warm_start", "warm_start_tail"),
-    (Visit::Solve, "solve", "solve_tail"),
-    (Visit::Relax, "relax", "relax_tail"),
-    (Visit::Restitution, "restitution", "restitution_tail"),
-];
+pub(crate) type VisitPasses = (Visit, &'static str, &'static str);
+pub(crate) const WARM_START: VisitPasses = (Visit::WarmStart, "warm_start", "warm_start_tail");
+pub(crate) const SOLVE: VisitPasses = (Visit::Solve, "solve", "solve_tail");
+pub(crate) const RELAX: VisitPasses = (Visit::Relax, "relax", "relax_tail");
+pub(crate) const LOAD: VisitPasses = (Visit::Load, "load", "load_tail");
+pub(crate) const PASS: VisitPasses = (Visit::Pass, "one_pass", "one_pass_tail");
+pub(crate) const RESTITUTION: VisitPasses = (Visit::Restitution, "restitution", "restitution_tail");
+
+/// Every solver, with its visits.
+pub(crate) fn solvers() -> [(Solver, Vec<VisitPasses>); 2] {
+    [
+        (Solver::OnePass(OnePass::default()), vec![LOAD, PASS, RESTITUTION]),
+        (Solver::Soft(Soft::default()), vec![WARM_START, SOLVE, RELAX, RESTITUTION]),
+    ]
+}
 
 /// A scene in mid-motion, and its next step up to the solver.
 pub(crate) struct Stage {
@@ -29,7 +38,11 @@ pub(crate) struct Stage {
 
 impl Stage {
     pub(crate) fn new(scene: &Scene, steps: u32) -> Self {
-        let cpu = Cpu::after(scene, steps);
+        Self::by(Solver::default(), scene, steps)
+    }
+
+    pub(crate) fn by(solver: Solver, scene: &Scene, steps: u32) -> Self {
+        let cpu = Cpu::after_by(solver, scene, steps);
         let frame = cpu.plan(false);
         let mut control = control_of(&frame, false);
         control.batch_start[..65].copy_from_slice(&frame.batches.start);
@@ -43,10 +56,16 @@ impl Stage {
     }
 
     pub(crate) fn all() -> impl Iterator<Item = (String, Self)> {
-        let sizes = SIZES.into_iter().map(|bodies| (format!("{bodies} bodies"), Self::new(&scene_of(bodies), 40)));
-        let hub = ("hub".to_owned(), Self::new(&scenes::hub(500), 2));
+        Self::all_by(Solver::default())
+    }
+
+    pub(crate) fn all_by(solver: Solver) -> impl Iterator<Item = (String, Self)> {
+        let of =
+            move |what: String, scene: &Scene, steps| (format!("{solver}, {what}"), Self::by(solver, scene, steps));
+        let sizes = SIZES.into_iter().map(move |bodies| of(format!("{bodies} bodies"), &scene_of(bodies), 40));
+        let hub = of("hub".to_owned(), &scenes::hub(500), 2);
         // So deep that overlap is undone at the highest speed.
-        let overlap = ("overlap".to_owned(), Self::new(&scenes::overlap_cube().0, 0));
+        let overlap = of("overlap".to_owned(), &scenes::overlap_cube().0, 0);
         sizes.chain([hub, overlap])
     }
 
@@ -78,6 +97,7 @@ impl Stage {
         alone.put("next_pairs", &frame.matched.pairs);
         alone.put("manifolds", &frame.manifolds);
         alone.put("slot_impulses", &cpu.impulses);
+        alone.put("slot_memory", &cpu.memory);
         alone.put("states", &cpu.states);
         alone.put("poses", &vec![PoseRecord::zeroed(); cpu.states.len()]);
         self.put_solver(alone);
@@ -105,7 +125,7 @@ impl Stage {
     }
 
     /// One visit to every constraint on the GPU: a dispatch a batch, and one for those from `wide_batches` on.
-    pub(crate) fn sweep(&self, chain: &mut Chain, (_, wide, tail): (Visit, &str, &str), wide_batches: u32) {
+    pub(crate) fn sweep(&self, chain: &mut Chain, (_, wide, tail): VisitPasses, wide_batches: u32) {
         for batch in 0..wide_batches {
             let start = &self.frame.batches.start[batch as usize..];
             let groups = (start[1] - start[0]).div_ceil(64) + 1;
@@ -129,7 +149,9 @@ pub(crate) fn used<T: Copy>(heads: &[ConstraintHead], four: &[T]) -> Vec<T> {
     heads.iter().zip(four.chunks_exact(4)).flat_map(of).collect()
 }
 
-/// All but the velocities, which must be as they were, bit for bit.
+/// All but what visits and integration of velocities change: that must be as it was, bit for bit.
 pub(crate) fn still(body: &SolverBody) -> SolverBody {
-    SolverBody { linear_velocity: [0.0; 3], angular_velocity: [0.0; 3], ..*body }
+    let none = [0.0; 3];
+    let still = SolverBody { linear_velocity: none, angular_velocity: none, ..*body };
+    SolverBody { linear_start: none, angular_start: none, weight: 0.0, weighted: 0.0, ..still }
 }

@@ -23,6 +23,7 @@ mod report;
 mod scene;
 pub mod scenes;
 mod shape;
+mod solver;
 #[doc(hidden)]
 pub mod stopwatch;
 pub mod validate;
@@ -43,5 +44,6 @@ pub use query::{Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Ray, Ray
 pub use report::{Penetration, StageRun, StageTime, StepReport};
 pub use scene::Scene;
 pub use shape::Shape;
+pub use solver::{OnePass, Soft, Solver};
 
 pub use glam;

@@ -2,7 +2,7 @@
 //! documented range of each field).
 
 use tumble_core::glam::{Quat, Vec3};
-use tumble_core::{ColliderBuilder, Error, PackedScene, Params, RigidBodyBuilder, Scene};
+use tumble_core::{ColliderBuilder, Error, OnePass, PackedScene, Params, RigidBodyBuilder, Scene, Soft, Solver};
 
 const NAN: f32 = f32::NAN;
 const INF: f32 = f32::INFINITY;
@@ -163,6 +163,7 @@ fn gravity() {
 fn params() {
     let good = Params::default();
     good.validate().unwrap();
+    let by = |solver| Params { solver, ..good };
     let capacities = |pairs| tumble_core::Capacities { pairs: Some(pairs), ..good.capacities };
     let mut cases = vec![
         (Params { substeps: 0, ..good }, "substeps"),
@@ -173,8 +174,11 @@ fn params() {
     for bad in [NAN, INF, -INF, -1.0] {
         cases.extend([
             (Params { dt: bad, ..good }, "dt"),
-            (Params { contact_frequency: bad, ..good }, "contact_frequency"),
-            (Params { contact_damping_ratio: bad, ..good }, "contact_damping_ratio"),
+            (by(Solver::Soft(Soft { frequency: bad, ..Soft::default() })), "solver.frequency"),
+            (by(Solver::Soft(Soft { static_frequency: bad, ..Soft::default() })), "solver.static_frequency"),
+            (by(Solver::Soft(Soft { damping_ratio: bad, ..Soft::default() })), "solver.damping_ratio"),
+            (by(Solver::OnePass(OnePass { stiffness: bad, ..OnePass::default() })), "solver.stiffness"),
+            (by(Solver::OnePass(OnePass { leak: bad, ..OnePass::default() })), "solver.leak"),
             (Params { max_push_speed: bad, ..good }, "max_push_speed"),
             (Params { speculative_distance: bad, ..good }, "speculative_distance"),
             (Params { restitution_threshold: bad, ..good }, "restitution_threshold"),

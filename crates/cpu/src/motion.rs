@@ -2,6 +2,7 @@
 
 use crate::bounds::{STATE_LIMIT, moves};
 use crate::math::{finite, quat, rotate, rotate_back, vec3};
+use crate::solver::one_pass::ease;
 use glam::{Quat, Vec3};
 use tumble_core::layout::{BodyProps, BodyState, SolverBody, StepParams, body_flags};
 
@@ -26,6 +27,32 @@ pub fn integrate_velocity(body: &mut SolverBody, state: &BodyState, props: &Body
     let turn = crate::math::inverse_inertia_times(body, vec3(state.torque));
     let angular = vec3(body.angular_velocity) + turn * step.h;
     body.angular_velocity = (angular * (1.0 / (1.0 + step.h * props.angular_damping))).to_array();
+}
+
+/// One pass: velocities before the first sub-step's impulses.
+pub fn first_substep(body: &mut SolverBody, state: &BodyState, props: &BodyProps, step: &StepParams) {
+    integrate_velocity(body, state, props, step);
+    body.linear_start = body.linear_velocity;
+    body.angular_start = body.angular_velocity;
+}
+
+/// One pass: moves the body, and starts the next sub-step with the impulses of this one: what they added to the
+/// velocity, they will add again.
+pub fn next_substep(body: &mut SolverBody, state: &BodyState, props: &BodyProps, step: &StepParams) {
+    let linear = vec3(body.linear_velocity) - vec3(body.linear_start);
+    let angular = vec3(body.angular_velocity) - vec3(body.angular_start);
+    integrate_position(body, state, props, step);
+    first_substep(body, state, props, step);
+    if body.inverse_mass > 0.0 {
+        body.linear_velocity = (vec3(body.linear_velocity) + linear).to_array();
+        body.angular_velocity = (vec3(body.angular_velocity) + angular).to_array();
+    }
+}
+
+/// One pass: takes down how soft the load on the body is, and moves it.
+pub fn last_substep(body: &mut SolverBody, state: &BodyState, props: &BodyProps, step: &StepParams) {
+    body.eigenvalue = ease(body, state, props);
+    integrate_position(body, state, props, step);
 }
 
 /// Position and rotation over one sub-step.
@@ -140,6 +167,7 @@ pub fn commit(body: &SolverBody, state: &BodyState) -> (BodyState, bool) {
         new.rotation = (quat(body.delta) * quat(state.rotation)).normalize().to_array();
         new.linear_velocity = body.linear_velocity;
         new.angular_velocity = body.angular_velocity;
+        new.eigenvalue = body.eigenvalue;
     } else {
         new.flags |= body_flags::FROZEN;
         new.linear_velocity = [0.0; 3];

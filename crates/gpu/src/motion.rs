@@ -1,4 +1,4 @@
-//! Stage `motion`: integration, commit, poses. Host side of `shaders/motion.wgsl`.
+//! Stage `motion`: commit and poses; its sub-steps are the solver's. Host side of `shaders/motion.wgsl`.
 
 use crate::{Gpu, Pass, Pipelines, Recorder};
 use std::sync::Arc;
@@ -6,8 +6,6 @@ use tumble_core::Result;
 use tumble_core::layout::StepParams;
 
 pub(crate) struct Motion {
-    integrate_velocities: Arc<Pass>,
-    integrate_positions: Arc<Pass>,
     commit: Arc<Pass>,
     write_poses: Arc<Pass>,
 }
@@ -15,20 +13,7 @@ pub(crate) struct Motion {
 impl Motion {
     pub(crate) fn new(gpu: &Gpu, pipelines: &mut Pipelines) -> Result<Self> {
         let mut pass = |entry| pipelines.pass(gpu, "motion", entry);
-        Ok(Self {
-            integrate_velocities: pass("integrate_velocities")?,
-            integrate_positions: pass("integrate_positions")?,
-            commit: pass("commit")?,
-            write_poses: pass("write_poses")?,
-        })
-    }
-
-    pub(crate) fn record_velocities(&self, recorder: &mut Recorder, step: &StepParams) -> Result<()> {
-        recorder.dispatch(&self.integrate_velocities, &[], step.body_count.div_ceil(256))
-    }
-
-    pub(crate) fn record_positions(&self, recorder: &mut Recorder, step: &StepParams) -> Result<()> {
-        recorder.dispatch(&self.integrate_positions, &[], step.body_count.div_ceil(256))
+        Ok(Self { commit: pass("commit")?, write_poses: pass("write_poses")? })
     }
 
     pub(crate) fn record_commit(&self, recorder: &mut Recorder, step: &StepParams) -> Result<()> {

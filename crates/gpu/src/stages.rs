@@ -20,6 +20,8 @@ use tumble_core::{Plan, Result};
 pub(crate) struct Built {
     pub(crate) plan: Plan,
     pub(crate) choice: Choice,
+    /// `StepParams::solver`.
+    pub(crate) solver: u32,
 }
 
 /// Every stage that the plan needs, made for arrays of these sizes.
@@ -47,7 +49,7 @@ impl Stages {
             narrowphase: Narrowphase::new(gpu, pipelines, plan)?,
             sleep: plan.islands.then(|| Sleep::new(gpu, pipelines, sizes)).transpose()?,
             batch: Batch::new(gpu, pipelines, sizes)?,
-            solver: Solver::new(gpu, pipelines, plan)?,
+            solver: Solver::new(gpu, pipelines, plan, built.solver)?,
             motion: Motion::new(gpu, pipelines)?,
         })
     }
@@ -79,7 +81,7 @@ impl Stages {
         }
         self.batch.record(recorder, buffers, step, self.contact.a_pair())?;
 
-        self.solver.record(recorder, buffers, &self.motion, step)?;
+        self.solver.record(recorder, buffers, step)?;
         self.contact.record_commit(recorder, buffers)?;
         self.motion.record_commit(recorder, step)?;
         if let Some(sleep) = self.sleep.as_ref().filter(|_| may_sleep) {

@@ -4,7 +4,7 @@ use crate::{Bind, Buffers, Gpu};
 use bytemuck::Zeroable;
 use tumble_core::layout::{
     Aabb, BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Control, EditRange, EditRecord,
-    FoundManifold, Impulse, Manifold, Pair, PoseRecord, Rest, SolverBody, StepParams,
+    FoundManifold, Impulse, Manifold, ManifoldMemory, Pair, PoseRecord, Rest, SolverBody, StepParams,
 };
 use tumble_core::{PackedScene, Result};
 use wgpu::BufferUsages;
@@ -59,7 +59,7 @@ enum Per {
 }
 
 /// Name, bytes of an element, what it follows, whether its content outlives a step.
-const ARRAYS: [(&str, usize, Per, bool); 32] = [
+const ARRAYS: [(&str, usize, Per, bool); 33] = [
     ("states", size_of::<BodyState>(), Per::Body, true),
     ("work_states", size_of::<BodyState>(), Per::Body, false),
     ("props", size_of::<BodyProps>(), Per::Body, true),
@@ -78,6 +78,7 @@ const ARRAYS: [(&str, usize, Per, bool); 32] = [
     ("free_slots", 4, Per::Pair, true),
     ("batch_of_slot", 4, Per::Pair, true),
     ("slot_impulses", 4 * size_of::<Impulse>(), Per::Pair, true),
+    ("slot_memory", size_of::<ManifoldMemory>(), Per::Pair, true),
     ("found_manifolds", size_of::<FoundManifold>(), Per::Pair, true),
     ("pair_keys", 8, Per::Pair, false),
     ("pair_values", 4, Per::Pair, false),

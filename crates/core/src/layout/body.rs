@@ -46,8 +46,9 @@ pub struct BodyState {
     pub pad_b: u32,
     /// Torque of the coming step about the centre of mass, N m, world frame.
     pub torque: [f32; 3],
-    /// Unused.
-    pub pad_c: u32,
+    /// Estimate of how fast the impulses that the body bears can change: the smallest eigenvalue of the scaled contact
+    /// matrix, for the load as it is. From step to step; see `solver/one_pass`.
+    pub eigenvalue: f32,
 }
 
 /// What a body is made of; changes only by edits. 80 bytes.
@@ -99,7 +100,7 @@ pub struct Rest {
     pub pad_c: u32,
 }
 
-/// Hot state of a body within one step; built by `solver/prepare`, thrown away after the commit. 96 bytes, at multiples of 16.
+/// Hot state of a body within one step; built by `solver/prepare`, thrown away after the commit. 128 bytes, at multiples of 16.
 #[repr(C, align(16))]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct SolverBody {
@@ -113,8 +114,8 @@ pub struct SolverBody {
     pub touched: u32,
     /// Change of position since the step began, m.
     pub translation: [f32; 3],
-    /// Unused.
-    pub pad_a: u32,
+    /// [`BodyState::eigenvalue`].
+    pub eigenvalue: f32,
     /// Change of rotation since the step began, world frame: rotation = delta * start.
     pub delta: [f32; 4],
     /// xx, yy, zz of the inverse inertia in the world frame at the start of the step, 1/(kg m²).
@@ -125,6 +126,15 @@ pub struct SolverBody {
     pub inverse_inertia_off: [f32; 3],
     /// Unused.
     pub pad_c: u32,
+    /// One pass: the velocity with which the sub-step began, before impulses, m/s. What the velocity has more, carries
+    /// over.
+    pub linear_start: [f32; 3],
+    /// Sum over the body's contacts of impulse² / mass, J: what the eigenvalue is weighed with.
+    pub weight: f32,
+    /// The same of the angular velocity, rad/s.
+    pub angular_start: [f32; 3],
+    /// Sum over the contacts of their weight times the eigenvalue of the body on the other side, J.
+    pub weighted: f32,
 }
 
 /// A pose as a user or renderer sees it: the body's own frame, by handle slot. 32 bytes.

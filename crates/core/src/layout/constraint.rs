@@ -1,7 +1,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// What the points of one constraint share. 48 bytes. Constraints lie in batch order.
+/// What the points of one constraint share. 64 bytes. Constraints lie in batch order.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct ConstraintHead {
@@ -19,12 +19,20 @@ pub struct ConstraintHead {
     pub count: u32,
     /// Combined restitution.
     pub restitution: f32,
-    /// Soft contact: share of the overlap undone, 1/s.
+    /// Spring: share of the overlap undone, 1/s.
     pub bias_rate: f32,
-    /// Soft contact: factor on the mass.
+    /// Spring: factor on the mass.
     pub mass_scale: f32,
-    /// Soft contact: share of the impulse that leaks.
+    /// Spring: share of the impulse that leaks.
     pub impulse_scale: f32,
+    /// One pass: what a point bears in the long run, mean over the points, N s. Follows their impulses.
+    pub remembered: f32,
+    /// Part of `anchor_a` along the normal that does not turn with the body, because the body is a ball there, m.
+    pub round_a: f32,
+    /// The same of `anchor_b`.
+    pub round_b: f32,
+    /// Unused.
+    pub pad_a: u32,
 }
 
 /// One contact point as the solver sees it. 48 bytes.
@@ -33,7 +41,7 @@ pub struct ConstraintHead {
 pub struct ConstraintPoint {
     /// From the centre of mass of a, world axes at the start of the step, m.
     pub anchor_a: [f32; 3],
-    /// Separation less `dot(anchor_b - anchor_a, normal)`, so that the current one is this plus the moved anchors' share, m.
+    /// Separation less the normal part of `anchor_b - anchor_a` that turns with the bodies, so that the current one is this plus the moved anchors' share, m.
     pub adjusted_separation: f32,
     /// From the centre of mass of b, m.
     pub anchor_b: [f32; 3],
@@ -59,6 +67,20 @@ pub struct Impulse {
     pub tangent: [f32; 2],
     /// Feature that it belongs to.
     pub feature: u32,
+}
+
+/// What a slot remembers of its manifold as a whole. 16 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+pub struct ManifoldMemory {
+    /// Sum over the points of [`ConstraintHead::remembered`], N s. Means nothing where the slot has no contact.
+    pub remembered: f32,
+    /// Unused.
+    pub pad_a: u32,
+    /// Unused.
+    pub pad_b: u32,
+    /// Unused.
+    pub pad_c: u32,
 }
 
 /// Two unit vectors that make a frame with `n`. They jump where |n.x| passes 0.577, far from the axes along which

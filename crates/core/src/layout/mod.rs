@@ -15,10 +15,10 @@ mod tree;
 
 pub use body::{BodyProps, BodyState, PoseRecord, Rest, SolverBody, body_flags, pose_tag};
 pub use collider::{Aabb, Collider, aabb_body, shape_kind};
-pub use constraint::{ConstraintHead, ConstraintPoint, Impulse, tangents};
+pub use constraint::{ConstraintHead, ConstraintPoint, Impulse, ManifoldMemory, tangents};
 pub use control::{BATCHES, Control, LAST_BATCH, QUARANTINE_NAMES, UNBATCHED, overflow};
 pub use edit::{EditRange, EditRecord, edit_op};
 pub use manifold::{FoundManifold, Manifold, ManifoldPoint, NO_SLOT, Pair, pair_kind};
 pub use query::{NO_COLLIDER, PlacedShape, QueryAnswer, QueryInfo, QueryPoint, QueryRay, QueryVolume, query_word};
-pub use step::StepParams;
+pub use step::{StepParams, solver};
 pub use tree::{NO_NODE, TreeInfo, TreeNode, root_of, tree_members};

@@ -1,6 +1,14 @@
 use bytemuck::{Pod, Zeroable};
 
-/// What one step is told, as a uniform. 128 bytes.
+/// Values of [`StepParams::solver`].
+pub mod solver {
+    /// One sweep a sub-step.
+    pub const ONE_PASS: u32 = 0;
+    /// Soft sub-stepping.
+    pub const SOFT: u32 = 1;
+}
+
+/// What one step is told, as a uniform. 144 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct StepParams {
@@ -16,7 +24,7 @@ pub struct StepParams {
     pub gravity: [f32; 3],
     /// Number of the step, from 1.
     pub step: u32,
-    /// Soft contact between bodies that move: share of the overlap undone, 1/s.
+    /// Spring of a contact between bodies that move: share of the overlap undone, 1/s.
     pub bias_rate: f32,
     /// Factor on the mass.
     pub mass_scale: f32,
@@ -56,12 +64,20 @@ pub struct StepParams {
     pub static_mass_scale: f32,
     /// `impulse_scale` of those.
     pub static_impulse_scale: f32,
+    /// One pass: rate at which memory follows, a sub-step, over the eigenvalue of the load.
+    pub memory_gain: f32,
+    /// The largest such rate.
+    pub memory_limit: f32,
+    /// Gap times mass, over the remembered impulse, below which a contact that pushes is still pressed, s.
+    pub memory_band: f32,
+    /// Change of speed by which an impulse is a blow, m/s.
+    pub blow_speed: f32,
+    /// Which of the laws in [`solver`].
+    pub solver: u32,
     /// How far a point of a body's surface may stray while the body is at rest, m; below 0 where nothing sleeps.
     pub sleep_distance: f32,
     /// How long all bodies of an island must have been at rest before it sleeps, s.
     pub sleep_time: f32,
     /// 1 when all who sleep wake.
     pub wake_all: u32,
-    /// Unused.
-    pub pad_a: u32,
 }

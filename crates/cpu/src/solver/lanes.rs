@@ -1,8 +1,9 @@
 //! Four constraints side by side, for the fast form of the visits (`soft_lanes`). The plain form is `soft`.
 
+use super::push_lanes;
 use crate::shared::Shared;
 use std::ops::{Add, Mul, Sub};
-use tumble_core::layout::{ConstraintHead, Impulse, ManifoldPoint};
+use tumble_core::layout::{ConstraintHead, Impulse, ManifoldPoint, SolverBody, StepParams};
 use wide::f32x4;
 
 /// Constraints side by side.
@@ -80,13 +81,11 @@ pub(crate) struct PointLanes {
     pub(crate) tangent: [f32x4; 2],
 }
 
-/// Four constraints of one batch.
+/// What the points of four constraints share.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct ConstraintLanes {
+pub(crate) struct HeadLanes {
     pub(crate) body_a: [u32; LANES],
     pub(crate) body_b: [u32; LANES],
-    /// Points of the constraint that has most.
-    pub(crate) count: usize,
     /// Points of each, as floats.
     pub(crate) counts: f32x4,
     /// From the centre of mass of a to that of b, when the points were found.
@@ -98,28 +97,50 @@ pub(crate) struct ConstraintLanes {
     pub(crate) bias_rate: f32x4,
     pub(crate) mass_scale: f32x4,
     pub(crate) impulse_scale: f32x4,
-    pub(crate) points: [PointLanes; 4],
+    pub(crate) remembered: f32x4,
+    pub(crate) round_a: f32x4,
+    pub(crate) round_b: f32x4,
+}
+
+/// Four constraints of one batch.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ConstraintLanes {
+    pub(crate) head: HeadLanes,
+    /// Points of the constraint that has most.
+    count: usize,
+    points: [PointLanes; 4],
 }
 
 impl ConstraintLanes {
     /// No constraint in any lane.
     pub(crate) fn empty() -> Self {
-        Self { body_a: [NO_BODY; LANES], body_b: [NO_BODY; LANES], ..Self::default() }
+        let head = HeadLanes { body_a: [NO_BODY; LANES], body_b: [NO_BODY; LANES], ..HeadLanes::default() };
+        Self { head, ..Self::default() }
+    }
+
+    /// The head, and the points in use.
+    #[inline(always)]
+    pub(crate) fn split(&mut self) -> (&mut HeadLanes, &mut [PointLanes]) {
+        (&mut self.head, &mut self.points[..self.count])
     }
 
     /// Puts a constraint's head into a lane.
-    pub(crate) fn set_head(&mut self, lane: usize, head: &ConstraintHead, between: [f32; 3]) {
-        self.body_a[lane] = head.body_a;
-        self.body_b[lane] = head.body_b;
-        self.count = self.count.max(head.count as usize);
-        set(&mut self.counts, lane, head.count as f32);
-        self.between.set(lane, between);
-        self.normal.set(lane, head.normal);
-        set(&mut self.friction, lane, head.friction);
-        set(&mut self.restitution, lane, head.restitution);
-        set(&mut self.bias_rate, lane, head.bias_rate);
-        set(&mut self.mass_scale, lane, head.mass_scale);
-        set(&mut self.impulse_scale, lane, head.impulse_scale);
+    pub(crate) fn set_head(&mut self, lane: usize, from: &ConstraintHead, between: [f32; 3]) {
+        self.count = self.count.max(from.count as usize);
+        let head = &mut self.head;
+        head.body_a[lane] = from.body_a;
+        head.body_b[lane] = from.body_b;
+        set(&mut head.counts, lane, from.count as f32);
+        head.between.set(lane, between);
+        head.normal.set(lane, from.normal);
+        set(&mut head.friction, lane, from.friction);
+        set(&mut head.restitution, lane, from.restitution);
+        set(&mut head.bias_rate, lane, from.bias_rate);
+        set(&mut head.mass_scale, lane, from.mass_scale);
+        set(&mut head.impulse_scale, lane, from.impulse_scale);
+        set(&mut head.remembered, lane, from.remembered);
+        set(&mut head.round_a, lane, from.round_a);
+        set(&mut head.round_b, lane, from.round_b);
     }
 
     /// Puts a point with its impulse into a lane; masses and the other arm follow for all lanes at once.
@@ -132,6 +153,31 @@ impl ConstraintLanes {
         set(&mut to.tangent[1], lane, impulse.tangent[1]);
     }
 
+    /// Applies the impulses of the last visit.
+    #[inline(always)]
+    pub(crate) fn warm_start(&self, a: &mut BodyLanes, b: &mut BodyLanes) {
+        push_lanes::warm_start(&self.head, &self.points[..self.count], a, b);
+    }
+
+    /// Bounces.
+    #[inline(always)]
+    pub(crate) fn bounce(&mut self, a: &mut BodyLanes, b: &mut BodyLanes, step: &StepParams) {
+        let (head, points) = self.split();
+        for p in points {
+            push_lanes::bounce(head, p, a, b, step);
+        }
+    }
+
+    /// The arms of one point.
+    pub(crate) fn arms(&self, point: usize) -> [V3; 2] {
+        [self.points[point].anchor_a, self.points[point].anchor_b]
+    }
+
+    /// What the constraint of one lane remembers, per point.
+    pub(crate) fn remembered(&self, lane: usize) -> f32 {
+        self.head.remembered.as_array()[lane]
+    }
+
     /// The accumulated impulse of one point of one lane.
     pub(crate) fn impulse(&self, lane: usize, point: usize) -> (f32, [f32; 2]) {
         let p = &self.points[point];
@@ -140,7 +186,13 @@ impl ConstraintLanes {
     }
 }
 
-/// Four bodies. Rows 0 and 1 of [`SolverBody`](tumble_core::layout::SolverBody) change in a visit.
+/// What a constraint adds to a body's weights.
+pub(crate) struct Weights {
+    pub(crate) weight: f32x4,
+    pub(crate) weighted: f32x4,
+}
+
+/// Four bodies. Rows 0 and 1 of [`SolverBody`] change in a visit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BodyLanes {
     pub(crate) linear: V3,
@@ -149,13 +201,16 @@ pub(crate) struct BodyLanes {
     /// The field beside the angular velocity, carried along.
     touched: f32x4,
     pub(crate) translation: V3,
+    pub(crate) eigenvalue: f32x4,
     pub(crate) delta: [f32x4; 4],
     pub(crate) inertia_diagonal: V3,
     pub(crate) inertia_off: V3,
 }
 
-/// Number of `f32x4` that make one [`SolverBody`](tumble_core::layout::SolverBody).
-const ROWS: usize = 6;
+/// Number of `f32x4` that make one [`SolverBody`].
+const ROWS: usize = size_of::<SolverBody>() / 16;
+/// Row of the linear start with the weight; the next one has the angular start with what is weighted.
+const START: usize = 6;
 
 impl BodyLanes {
     /// Loads four bodies by `read`, which gives element i of the bodies seen as rows; without their change of pose when
@@ -167,7 +222,7 @@ impl BodyLanes {
         let [vx, vy, vz, inverse_mass] = row(0);
         let [wx, wy, wz, touched] = row(1);
         let zero = [f32x4::ZERO; 4];
-        let ([tx, ty, tz, _], delta) = if moved { (row(2), row(3)) } else { (zero, zero) };
+        let ([tx, ty, tz, eigenvalue], delta) = if moved { (row(2), row(3)) } else { (zero, zero) };
         let [dx, dy, dz, _] = row(4);
         let [ox, oy, oz, _] = row(5);
         Self {
@@ -176,6 +231,7 @@ impl BodyLanes {
             angular: V3::new(wx, wy, wz),
             touched,
             translation: V3::new(tx, ty, tz),
+            eigenvalue,
             delta,
             inertia_diagonal: V3::new(dx, dy, dz),
             inertia_off: V3::new(ox, oy, oz),
@@ -197,6 +253,56 @@ impl BodyLanes {
                 unsafe { bodies.set(row, linear[lane]) };
                 // SAFETY: the caller's promise.
                 unsafe { bodies.set(row + 1, angular[lane]) };
+            }
+        }
+    }
+
+    /// Adds to the weights of those that can be pushed.
+    ///
+    /// # Safety
+    /// As for [`BodyLanes::scatter`].
+    #[inline(always)]
+    pub(crate) unsafe fn weigh(&self, bodies: &Shared<'_, f32x4>, index: [u32; LANES], weights: Weights) {
+        for lane in 0..LANES {
+            if self.inverse_mass.as_array()[lane] > 0.0 {
+                let row = ROWS * index[lane] as usize + START;
+                for (row, more) in [(row, weights.weight), (row + 1, weights.weighted)] {
+                    // SAFETY: the caller's promise.
+                    let mut start = unsafe { bodies.get(row) };
+                    start.as_mut_array()[3] += more.as_array()[lane];
+                    // SAFETY: the caller's promise.
+                    unsafe { bodies.set(row, start) };
+                }
+            }
+        }
+    }
+
+    /// Counts what `push` at `r` does to those that can be pushed to what the sub-step began with; `sign` is -1 for the
+    /// first body of a pair.
+    ///
+    /// # Safety
+    /// As for [`BodyLanes::scatter`].
+    pub(crate) unsafe fn start_after(
+        &self,
+        bodies: &Shared<'_, f32x4>,
+        index: [u32; LANES],
+        sign: f32,
+        r: V3,
+        push: V3,
+    ) {
+        let linear = self.inverse_mass * push;
+        let angular = self.inverse_inertia_times(r.cross(push));
+        for lane in 0..LANES {
+            if self.inverse_mass.as_array()[lane] > 0.0 {
+                let row = ROWS * index[lane] as usize + START;
+                for (row, change) in [(row, linear), (row + 1, angular)] {
+                    let at = |v: f32x4| sign * v.as_array()[lane];
+                    // SAFETY: the caller's promise.
+                    let start = unsafe { bodies.get(row) };
+                    let more = f32x4::new([at(change.x), at(change.y), at(change.z), 0.0]);
+                    // SAFETY: the caller's promise.
+                    unsafe { bodies.set(row, start + more) };
+                }
             }
         }
     }

@@ -1,18 +1,30 @@
-//! Stage `solver`: rows (`prepare`), the law of one visit (`soft`; four at a time in `soft_lanes`), the passes over
-//! batches (here), and the way back to the store (`store`). Twin of `shaders/solver/`.
+//! Stage `solver`: rows (`prepare`), the laws of a visit (`one_pass` and `soft`, on `push`; four constraints at a time
+//! in those called `_lanes`), the passes over batches (here), and the way back to the store (`store`). Twin of
+//! `shaders/solver/`.
 //!
-//! Soft sub-stepping, the shape that Box2D 3, Box3D and rapier converged on (Catto, "Solver2D", 2024; Macklin et al.,
-//! "Small Steps in Physics Simulation", SCA 2019): contacts are found once a step, and in each sub-step velocities
-//! are integrated, impulses of the last sub-step applied, contacts solved as damped springs, positions integrated, and
-//! contacts solved again as rigid, which takes out the velocity that the springs put in. Bounces come last.
+//! Contacts are found once a step and solved in sub-steps (Macklin et al., "Small Steps in Physics Simulation", SCA
+//! 2019), by one of these:
+//!
+//! - one pass: each sub-step predicts velocities by what the last one added to them, visits every contact once, and
+//!   integrates positions;
+//! - soft, the shape that Box2D 3, Box3D and rapier converged on (Catto, "Solver2D", 2024): in each sub-step velocities
+//!   are integrated, impulses of the last sub-step applied, contacts solved as damped springs, positions integrated, and
+//!   contacts solved again as rigid, which takes out the velocity that the springs put in.
+//!
+//! Bounces come last.
 
 mod lanes;
+pub mod one_pass;
+mod one_pass_lanes;
 pub mod prepare;
 mod prepare_lanes;
-pub mod soft;
+mod push;
+mod push_lanes;
+mod soft;
 mod soft_lanes;
 pub mod store;
 
+use crate::math::tangents;
 use crate::motion;
 use crate::shared::Shared;
 use lanes::{BodyLanes, ConstraintLanes, LANES};
@@ -20,6 +32,7 @@ use prepare::Contact;
 use rayon::prelude::*;
 use tumble_core::layout::{
     BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Impulse, LAST_BATCH, SolverBody, StepParams,
+    solver,
 };
 use wide::f32x4;
 
@@ -55,12 +68,16 @@ pub type PlainConstraint = (ConstraintHead, [ConstraintPoint; 4], [Impulse; 4]);
 /// What a visit to a constraint does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Visit {
-    /// Applies the impulses of the last visit.
+    /// Soft: applies the impulses of the last visit.
     WarmStart,
-    /// Soft.
+    /// Soft: as springs.
     Solve,
-    /// Rigid, no bias.
+    /// Soft: rigid, no bias.
     Relax,
+    /// One pass: applies the impulses of the last step.
+    Load,
+    /// One pass: all there is in a sub-step.
+    Pass,
     /// Bounces.
     Restitution,
 }
@@ -114,16 +131,18 @@ impl Rows {
         self.last = PlainRows::build(last, |c| prepare::prepare_constraint(&contact(c), colliders, bodies, step));
     }
 
-    /// Calls `take(c, impulses)` for every constraint, with (normal, tangent) of its four points, used or not; from many
-    /// threads at once.
-    pub fn for_each_constraint(&self, take: impl Fn(usize, [(f32, [f32; 2]); 4]) + Sync) {
+    /// Calls `take(c, remembered, impulses)` for every constraint, with (normal, tangent) of its four points, used or not;
+    /// from many threads at once.
+    pub fn for_each_constraint(&self, take: impl Fn(usize, f32, [(f32, [f32; 2]); 4]) + Sync) {
         self.groups.par_iter().zip(&self.members).with_min_len(64).for_each(|(group, &(first, count))| {
             for lane in 0..count as usize {
-                take(first as usize + lane, std::array::from_fn(|point| group.impulse(lane, point)));
+                let impulses = std::array::from_fn(|point| group.impulse(lane, point));
+                take(first as usize + lane, group.remembered(lane), impulses);
             }
         });
-        for (i, four) in self.last.impulses.chunks_exact(4).enumerate() {
-            take(self.last_first + i, std::array::from_fn(|point| (four[point].normal, four[point].tangent)));
+        for (i, (head, four)) in self.last.heads.iter().zip(self.last.impulses.chunks_exact(4)).enumerate() {
+            let impulses = std::array::from_fn(|point| (four[point].normal, four[point].tangent));
+            take(self.last_first + i, head.remembered, impulses);
         }
     }
 
@@ -139,18 +158,40 @@ impl Rows {
                 continue;
             }
             let shared = Shared::new(bytemuck::cast_slice_mut::<SolverBody, f32x4>(bodies));
-            let moved = matches!(visit, Visit::Solve | Visit::Relax);
+            let moved = !matches!(visit, Visit::WarmStart | Visit::Restitution);
             groups.par_iter_mut().with_min_len(64).for_each(|group| {
                 // SAFETY: constraints of one batch share no moving body (`batch`), and bodies that do not move are
                 // never written (`scatter`).
                 let read = |i: usize| unsafe { shared.get(i) };
-                let mut a = BodyLanes::gather(read, group.body_a, moved);
-                let mut b = BodyLanes::gather(read, group.body_b, moved);
-                soft_lanes::visit(visit, group, &mut a, &mut b, step);
+                let (ia, ib) = (group.head.body_a, group.head.body_b);
+                let mut a = BodyLanes::gather(read, ia, moved);
+                let mut b = BodyLanes::gather(read, ib, moved);
+                match visit {
+                    Visit::WarmStart => group.warm_start(&mut a, &mut b),
+                    Visit::Solve | Visit::Relax => soft_lanes::visit(visit, group, &mut a, &mut b, step),
+                    Visit::Load => {
+                        let [more_a, more_b] = one_pass_lanes::load(group, &mut a, &mut b);
+                        // SAFETY: as above.
+                        unsafe { a.weigh(&shared, ia, more_a) };
+                        // SAFETY: as above.
+                        unsafe { b.weigh(&shared, ib, more_b) };
+                    }
+                    Visit::Pass => {
+                        let blows = one_pass_lanes::pass(group, &mut a, &mut b, step);
+                        for (point, push) in blows.into_iter().enumerate().filter_map(|(k, push)| Some((k, push?))) {
+                            let [ra, rb] = group.arms(point);
+                            // SAFETY: as above.
+                            unsafe { a.start_after(&shared, ia, -1.0, ra, push) };
+                            // SAFETY: as above.
+                            unsafe { b.start_after(&shared, ib, 1.0, rb, push) };
+                        }
+                    }
+                    Visit::Restitution => group.bounce(&mut a, &mut b, step),
+                }
                 // SAFETY: as above.
-                unsafe { a.scatter(&shared, group.body_a) };
+                unsafe { a.scatter(&shared, ia) };
                 // SAFETY: as above.
-                unsafe { b.scatter(&shared, group.body_b) };
+                unsafe { b.scatter(&shared, ib) };
             });
         }
         self.last.sweep(bodies, step, visit);
@@ -173,10 +214,20 @@ impl PlainRows {
     /// One visit to every constraint, in order. Within a batch the order is of no account.
     pub fn sweep(&mut self, bodies: &mut [SolverBody], step: &StepParams, visit: Visit) {
         let points = self.points.chunks_exact_mut(4);
-        for (head, (points, impulses)) in self.heads.iter().zip(points.zip(self.impulses.chunks_exact_mut(4))) {
-            let (ia, ib) = (head.body_a as usize, head.body_b as usize);
+        for (head, (points, impulses)) in self.heads.iter_mut().zip(points.zip(self.impulses.chunks_exact_mut(4))) {
+            let (ia, ib, count) = (head.body_a as usize, head.body_b as usize, head.count as usize);
             let (mut a, mut b) = (bodies[ia], bodies[ib]);
-            soft::visit(visit, head, points, impulses, &mut a, &mut b, step);
+            let (points, impulses) = (&mut points[..count], &mut impulses[..count]);
+            let tangents = tangents(head.normal.into()).into();
+            match visit {
+                Visit::WarmStart => push::warm_start(head, tangents, points, impulses, &mut a, &mut b),
+                Visit::Solve | Visit::Relax => {
+                    soft::visit(visit, head, tangents, points, impulses, &mut a, &mut b, step);
+                }
+                Visit::Load => one_pass::load(head, tangents, points, impulses, &mut a, &mut b),
+                Visit::Pass => one_pass::pass(head, tangents, points, impulses, &mut a, &mut b, step),
+                Visit::Restitution => push::restitution(head, points, impulses, &mut a, &mut b, step),
+            }
             if a.inverse_mass > 0.0 {
                 bodies[ia] = a;
             }
@@ -187,7 +238,7 @@ impl PlainRows {
     }
 }
 
-/// Runs all sub-steps.
+/// Runs all sub-steps, by the law of `step.solver`.
 pub fn solve(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, restitution: bool) {
     substeps(bodies, step, restitution, |bodies, visit| rows.sweep(bodies, step, visit));
 }
@@ -199,18 +250,31 @@ pub fn solve_plain(rows: &mut PlainRows, bodies: Bodies<'_>, step: &StepParams, 
 
 fn substeps(bodies: Bodies<'_>, step: &StepParams, restitution: bool, mut sweep: impl FnMut(&mut [SolverBody], Visit)) {
     let Bodies { solver, states, props } = bodies;
-    for _ in 0..step.substeps {
+    let each = |solver: &mut [SolverBody], pass: BodyPass| {
         solver.par_iter_mut().zip(states.par_iter().zip(props)).with_min_len(512).for_each(|(body, (state, props))| {
-            motion::integrate_velocity(body, state, props, step);
+            pass(body, state, props, step);
         });
-        sweep(solver, Visit::WarmStart);
-        sweep(solver, Visit::Solve);
-        solver.par_iter_mut().zip(states.par_iter().zip(props)).with_min_len(512).for_each(|(body, (state, props))| {
-            motion::integrate_position(body, state, props, step);
-        });
-        sweep(solver, Visit::Relax);
+    };
+    if step.solver == solver::SOFT {
+        for _ in 0..step.substeps {
+            each(solver, motion::integrate_velocity);
+            sweep(solver, Visit::WarmStart);
+            sweep(solver, Visit::Solve);
+            each(solver, motion::integrate_position);
+            sweep(solver, Visit::Relax);
+        }
+    } else {
+        each(solver, motion::first_substep);
+        sweep(solver, Visit::Load);
+        for substep in 1..=step.substeps {
+            sweep(solver, Visit::Pass);
+            each(solver, if substep < step.substeps { motion::next_substep } else { motion::last_substep });
+        }
     }
     if restitution {
         sweep(solver, Visit::Restitution);
     }
 }
+
+/// What is done to each body.
+type BodyPass = fn(&mut SolverBody, &BodyState, &BodyProps, &StepParams);

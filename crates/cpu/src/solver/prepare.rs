@@ -7,8 +7,8 @@ use crate::math::{inverse_inertia_times, quat, tangents, vec3};
 use bytemuck::Zeroable;
 use glam::{Mat3, Vec3};
 use tumble_core::layout::{
-    BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Impulse, Manifold, Pair, SolverBody, StepParams,
-    pair_kind,
+    BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Impulse, Manifold, ManifoldMemory, Pair,
+    SolverBody, StepParams, pair_kind, shape_kind,
 };
 
 /// A body as the solver moves it; what nothing may push has no mass and keeps its velocity.
@@ -19,12 +19,16 @@ pub fn prepare_body(state: &BodyState, props: &BodyProps, mask: u64) -> SolverBo
         angular_velocity: state.angular_velocity,
         touched: u32::from(mask != 0),
         translation: [0.0; 3],
-        pad_a: 0,
+        eigenvalue: state.eigenvalue,
         delta: [0.0, 0.0, 0.0, 1.0],
         inverse_inertia_diagonal: [0.0; 3],
         pad_b: 0,
         inverse_inertia_off: [0.0; 3],
         pad_c: 0,
+        linear_start: [0.0; 3],
+        weight: 0.0,
+        angular_start: [0.0; 3],
+        weighted: 0.0,
     };
     if moves(state.flags) {
         body.inverse_mass = props.inverse_mass;
@@ -50,6 +54,8 @@ pub struct Contact<'a> {
     pub manifold: &'a Manifold,
     /// Impulses that the slot remembers.
     pub stored: &'a [Impulse],
+    /// What it remembers of the manifold as a whole.
+    pub memory: &'a ManifoldMemory,
 }
 
 /// One constraint's head, points and impulses.
@@ -77,7 +83,7 @@ pub fn prepare_constraint(
         let dv = point_velocity(b, rb) - point_velocity(a, ra);
         points[i] = ConstraintPoint {
             anchor_a: ra.to_array(),
-            adjusted_separation: manifold.points[i].separation - normal.dot(rb - ra),
+            adjusted_separation: manifold.points[i].separation - (normal.dot(rb - ra) - (head.round_b - head.round_a)),
             anchor_b: rb.to_array(),
             normal_mass: inverse(along(normal, normal)),
             tangent_mass: inverse(stiffest),
@@ -116,7 +122,22 @@ pub(super) fn prepare_head(
         bias_rate,
         mass_scale,
         impulse_scale,
+        remembered: remembered(contact),
+        round_a: round(ca, manifold),
+        round_b: -round(cb, manifold),
+        pad_a: 0,
     }
+}
+
+/// Part of an arm that does not turn with its body: from the centre of a ball to midway between the surfaces, m.
+fn round(collider: &Collider, manifold: &Manifold) -> f32 {
+    if collider.shape == shape_kind::BALL { collider.size[0] + 0.5 * manifold.points[0].separation } else { 0.0 }
+}
+
+/// What the slot remembers, shared among the points; nothing where it had no contact.
+fn remembered(contact: &Contact<'_>) -> f32 {
+    let fresh = contact.pair.kind & pair_kind::FRESH != 0 || contact.stored[0].feature == NO_FEATURE;
+    if fresh { 0.0 } else { contact.memory.remembered / contact.manifold.count as f32 }
 }
 
 /// The impulse that the slot remembers for a point whose feature stayed.

@@ -5,22 +5,23 @@ use wide::f32x4;
 
 /// Fills in what follows from the geometry: tangents, the other arm, masses, approach. `bodies` as rows.
 pub(super) fn prepare(c: &mut ConstraintLanes, bodies: &[f32x4]) {
-    let a = BodyLanes::gather(|i| bodies[i], c.body_a, false);
-    let b = BodyLanes::gather(|i| bodies[i], c.body_b, false);
-    let normal = c.normal;
-    c.tangents = tangents(normal);
-    let [t1, t2] = c.tangents;
+    let (head, points) = c.split();
+    let a = BodyLanes::gather(|i| bodies[i], head.body_a, false);
+    let b = BodyLanes::gather(|i| bodies[i], head.body_b, false);
+    let normal = head.normal;
+    head.tangents = tangents(normal);
+    let [t1, t2] = head.tangents;
     let half = f32x4::splat(0.5);
-    for (k, p) in c.points[..c.count].iter_mut().enumerate() {
-        let used = c.counts.simd_gt(f32x4::splat(k as f32));
+    for (k, p) in points.iter_mut().enumerate() {
+        let used = head.counts.simd_gt(f32x4::splat(k as f32));
         let ra = p.anchor_a;
-        let rb = ra - c.between;
+        let rb = ra - head.between;
         let along = |u: V3, v: V3| response(&a, &b, ra, rb, u, v);
         let (k11, k12, k22) = (along(t1, t1), along(t1, t2), along(t2, t2));
         let apart = f32x4::splat(0.25) * (k11 - k22) * (k11 - k22) + k12 * k12;
         let stiffest = half * (k11 + k22) + apart.sqrt();
         p.anchor_b = rb;
-        p.adjusted_separation -= normal.dot(rb - ra);
+        p.adjusted_separation -= normal.dot(rb - ra) - (head.round_b - head.round_a);
         p.normal_mass = used & inverse(along(normal, normal));
         p.tangent_mass = used & inverse(stiffest);
         p.approach = normal.dot(b.velocity_at(rb) - a.velocity_at(ra));

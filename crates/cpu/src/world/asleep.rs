@@ -19,7 +19,7 @@ use tumble_core::layout::{
     Aabb, BodyState, Collider, Control, FoundManifold, Manifold, Pair, Rest, StepParams, aabb_body, body_flags,
     edit_op, pair_kind, tree_members,
 };
-use tumble_core::{MortonBits, Params, Sleep};
+use tumble_core::{MortonBits, Sleep};
 
 /// Written only when a step commits, the tree excepted, which follows from the boxes.
 #[derive(Default)]
@@ -108,6 +108,12 @@ fn told(step: &StepParams) -> [u32; 4] {
     [x, y, z, step.speculative_distance].map(f32::to_bits)
 }
 
+/// When bodies are put to sleep, if they are.
+fn may_sleep(step: &StepParams) -> Option<Sleep> {
+    let (distance, time) = (step.sleep_distance, step.sleep_time);
+    (distance >= 0.0).then_some(Sleep { distance, time })
+}
+
 impl Asleep {
     /// Pairs that have slots, but are not on the list of those awake.
     pub(super) fn pairs_after(&self, waking: &Waking) -> u32 {
@@ -148,9 +154,9 @@ impl Asleep {
 
 impl Kept {
     /// Whether a step would change nothing but its number.
-    pub(super) fn is_idle(&self, edits: &EditBatch, params: &Params, step: &StepParams) -> bool {
+    pub(super) fn is_idle(&self, edits: &EditBatch, step: &StepParams) -> bool {
         let asleep = &self.asleep;
-        asleep.idle && params.sleep.is_some() && edits.records.is_empty() && asleep.told == told(step)
+        asleep.idle && may_sleep(step).is_some() && edits.records.is_empty() && asleep.told == told(step)
     }
 
     /// A step of a world that [is idle](Self::is_idle).
@@ -167,17 +173,17 @@ impl Kept {
     pub(super) fn wake_by_edits(
         &self,
         edits: &EditBatch,
-        params: &Params,
         step: &StepParams,
         states: &mut [BodyState],
     ) -> (Waking, Vec<Pair>) {
         let (asleep, mut waking) = (&self.asleep, Waking::default());
-        if params.sleep.is_some() && !edits.records.is_empty() {
+        let may_sleep = may_sleep(step).is_some();
+        if may_sleep && !edits.records.is_empty() {
             waking.edited = vec![false; states.len()];
             let bodies = edits.records.iter().filter(|record| record.op < edit_op::COLLIDER);
             bodies.for_each(|record| waking.edited[record.target as usize] = true);
         }
-        let all = params.sleep.is_none() || asleep.told != told(step);
+        let all = !may_sleep || asleep.told != told(step);
         if asleep.bodies == 0 || (!all && waking.edited.is_empty()) {
             return (waking, Vec::new());
         }
@@ -273,7 +279,7 @@ impl Kept {
 
     /// Looks who has rested long enough, and puts whole islands to sleep. `self.states` are those after the step, and
     /// `self.pairs` all that were looked at.
-    pub(super) fn settle(&mut self, outcome: Outcome, sleep: &Option<Sleep>, step: &StepParams, control: &mut Control) {
+    pub(super) fn settle(&mut self, outcome: Outcome, step: &StepParams, control: &mut Control) {
         let Outcome { states, manifolds, ends, waking } = outcome;
         let woken = waking.any();
         let asleep = &mut self.asleep;
@@ -283,7 +289,7 @@ impl Kept {
         }
         asleep.sums.add_to(control);
         asleep.told = told(step);
-        let Some(sleep) = sleep else {
+        let Some(sleep) = &may_sleep(step) else {
             if !asleep.rests.is_empty() {
                 *asleep = Asleep { changed: woken, ..Asleep::default() };
             }

@@ -12,11 +12,11 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{
-    Aabb, BodyProps, BodyState, Collider, Control, FoundManifold, Impulse, Manifold, Pair, PoseRecord,
+    Aabb, BodyProps, BodyState, Collider, Control, FoundManifold, Impulse, Manifold, ManifoldMemory, Pair, PoseRecord,
     QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, body_flags,
 };
 use tumble_core::stopwatch::Stopwatch;
-use tumble_core::{Broadphase, Error, Params, Result, Sleep, limits};
+use tumble_core::{Broadphase, Error, Params, Result, limits};
 
 /// What lives past a step; written only when a step commits (properties and colliders by edits, absolutely).
 pub(super) struct Kept {
@@ -30,6 +30,8 @@ pub(super) struct Kept {
     pub(super) batch_of_slot: Vec<u32>,
     /// Four a slot.
     pub(super) impulses: Vec<Impulse>,
+    /// By slot.
+    pub(super) memory: Vec<ManifoldMemory>,
     /// By slot.
     pub(super) found: Vec<FoundManifold>,
     pub(super) poses: Vec<PoseRecord>,
@@ -72,12 +74,14 @@ impl Kept {
         reserve(&mut free, count, "free_slots")?;
         reserve(&mut self.batch_of_slot, count, "batch_of_slot")?;
         reserve(&mut self.found, count, "found_manifolds")?;
+        reserve(&mut self.memory, count, "slot_memory")?;
         reserve(&mut self.impulses, 4 * count, "slot_impulses")?;
         free.extend((old..capacity).rev());
         free.append(&mut self.free);
         self.free = free;
         self.batch_of_slot.resize(count, UNBATCHED);
         self.found.resize(count, FoundManifold::zeroed());
+        self.memory.resize(count, ManifoldMemory::default());
         self.impulses.resize(4 * count, contact::NO_IMPULSE);
         Ok(())
     }
@@ -87,7 +91,7 @@ impl Kept {
         let body =
             2 * size_of::<BodyState>() + size_of::<BodyProps>() + size_of::<PoseRecord>() + size_of::<SolverBody>();
         let collider = size_of::<Collider>() + size_of::<Aabb>();
-        let slot = 8 + 4 * size_of::<Impulse>() + size_of::<FoundManifold>();
+        let slot = 8 + 4 * size_of::<Impulse>() + size_of::<ManifoldMemory>() + size_of::<FoundManifold>();
         let pair = 2 * size_of::<Pair>() + size_of::<Manifold>() + 12;
         let counted = self.states.len() * body
             + self.colliders.len() * collider
@@ -109,7 +113,7 @@ impl Kept {
         let states = self.edit(asked.edits, step);
         let Asked { edits, params, broadphase } = *asked;
         let mut states = self.quarantine(states, &mut control);
-        let (mut waking, woken) = self.wake_by_edits(edits, params, step, &mut states);
+        let (mut waking, woken) = self.wake_by_edits(edits, step, &mut states);
         let run = watch.next(run, "bounds");
         let aabbs: Vec<Aabb> =
             self.colliders.par_iter().with_min_len(256).map(|c| self.bounds(c, &states, step)).collect();
@@ -214,16 +218,9 @@ impl Kept {
     }
 
     /// Solves and writes everything that lives past the step.
-    pub(super) fn commit(
-        &mut self,
-        planned: Planned,
-        step: &StepParams,
-        asked: (bool, Option<Sleep>),
-        watch: &mut Stopwatch,
-    ) {
+    pub(super) fn commit(&mut self, planned: Planned, step: &StepParams, restitution: bool, watch: &mut Stopwatch) {
         let run = watch.begin("prepare");
         let Planned { states, matched, manifolds, batches, mut control, ends, waking } = planned;
-        let (restitution, sleep) = asked;
         let mut bodies: Vec<SolverBody> = (0..states.len())
             .into_par_iter()
             .with_min_len(512)
@@ -233,7 +230,8 @@ impl Kept {
             let index = batches.order[c] as usize;
             let pair = &matched.pairs[index];
             let stored = &self.impulses[4 * pair.slot as usize..][..4];
-            prepare::Contact { pair, manifold: &manifolds[index], stored }
+            let memory = &self.memory[pair.slot as usize];
+            prepare::Contact { pair, manifold: &manifolds[index], stored, memory }
         });
         let run = watch.next(run, "solver");
         let moving = solver::Bodies { solver: &mut bodies, states: &states, props: &self.props };
@@ -251,7 +249,7 @@ impl Kept {
         self.states = committed.into_par_iter().with_min_len(512).map(|(state, _)| state).collect();
         self.pairs = matched.pairs;
         let outcome = Outcome { states: &states, manifolds: &manifolds, ends: &ends, waking };
-        self.settle(outcome, &sleep, step, &mut control);
+        self.settle(outcome, step, &mut control);
         let posed = self.states.par_iter().zip(&self.props).with_min_len(512);
         self.poses = posed.map(|(s, p)| PoseRecord::of(s, p)).collect();
         control.frozen_count = self
@@ -287,12 +285,15 @@ impl Kept {
                 unsafe { impulses.set(slot, own) };
             }
         });
-        self.rows.for_each_constraint(|c, solved| {
+        let memory = Shared::new(&mut self.memory);
+        self.rows.for_each_constraint(|c, remembered, solved| {
             let index = batches.order[c] as usize;
             let slot = matched.pairs[index].slot as usize;
             let stored = std::array::from_fn(|k| store::store(&manifolds[index], k, solved[k].0, solved[k].1));
             // SAFETY: as above; each constraint is one of those pairs.
             unsafe { impulses.set(slot, stored) };
+            // SAFETY: as above.
+            unsafe { memory.set(slot, store::store_memory(&manifolds[index], remembered)) };
         });
     }
 }

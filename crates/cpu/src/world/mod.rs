@@ -67,6 +67,7 @@ impl World {
             free: Vec::new(),
             batch_of_slot: Vec::new(),
             impulses: Vec::new(),
+            memory: Vec::new(),
             found: Vec::new(),
             rows: Rows::default(),
             asleep: Asleep::default(),
@@ -155,7 +156,7 @@ impl World {
         step.cell_table_bits = limits::cell_table_bits(step.collider_count);
         step.large_limit = limits::large_limit(step.collider_count, self.editor.spread().is_wide());
         step.drop_pair = self.drop_pair;
-        if self.kept.is_idle(&edits, &self.params, &step) {
+        if self.kept.is_idle(&edits, &step) {
             self.kept.pass_time(&step);
             self.last_step.step = step.step;
             self.finish(self.watch.runs().len(), self.report.broadphase);
@@ -195,7 +196,7 @@ impl World {
 
     /// Plans and commits a step, growing the pair list between where that is needed and allowed.
     fn run(&mut self, edits: &EditBatch, mut step: StepParams, span: &Span) -> Result<()> {
-        let then = (self.editor.plan().restitution, self.params.sleep);
+        let restitution = self.editor.plan().restitution;
         let broadphase = self.params.broadphase.resolve(self.editor.spread());
         loop {
             let attempt = self.watch.runs().len();
@@ -204,7 +205,7 @@ impl World {
             let asked = Asked { edits, params: &self.params, broadphase };
             let mut planned_and_committed = || {
                 let planned = kept.plan(&asked, finder, &step, watch)?;
-                kept.commit(planned, &step, then, watch);
+                kept.commit(planned, &step, restitution, watch);
                 Ok(())
             };
             let run = match step.collider_count <= ALONE {

@@ -129,7 +129,9 @@ impl World {
         let poses: Vec<PoseRecord> =
             packed.states.iter().zip(&packed.props).map(|(s, p)| PoseRecord::of(s, p)).collect();
         gpu.queue.write_buffer(buffers.buffer("poses")?, 0, bytemuck::cast_slice(&poses));
-        let built = Built { plan: with_sleep(packed.plan, &params), choice: Choice::new(&params, &editor) };
+        let solver = params.step_params(0, Vec3::ZERO).solver;
+        let plan = with_sleep(packed.plan, &params);
+        let built = Built { plan, choice: Choice::new(&params, &editor), solver };
         let stages = {
             let _span = Span::enter("pipelines");
             Stages::new(&gpu, &mut pipelines, &sizes, &built)?
@@ -261,7 +263,8 @@ impl World {
         step.edit_ranges = edits.ranges.len() as u32;
         step.cell_table_bits = limits::cell_table_bits(colliders);
         let plan = with_sleep(self.editor.plan(), &self.params);
-        let wants = Built { plan, choice: Choice::new(&self.params, &self.editor) };
+        let choice = Choice::new(&self.params, &self.editor);
+        let wants = Built { plan, choice, solver: step.solver };
         step.large_limit = limits::large_limit(colliders, wants.choice.large_tree);
         step.drop_pair = std::mem::replace(&mut self.drop_pair, u32::MAX);
         let [x, y, z] = step.gravity;
@@ -305,8 +308,9 @@ impl World {
     fn submit(&mut self, mut record: Record) -> Result<()> {
         let mut wanted = self.built;
         let widened = wanted.plan.widen(&record.wants.plan);
-        if widened || wanted.choice != record.wants.choice {
-            wanted.choice = record.wants.choice;
+        let Built { choice, solver, .. } = record.wants;
+        if widened || (wanted.choice, wanted.solver) != (choice, solver) {
+            (wanted.choice, wanted.solver) = (choice, solver);
             let run = self.watch.begin("pipelines");
             if wanted.plan.islands && self.sizes.sleepers == 0 {
                 self.sizes.sleepers = self.sizes.bodies;

@@ -1,0 +1,64 @@
+//! What the laws of `push` do, four constraints at a time: the same operations in the same order, so the same results.
+
+use super::lanes::{BodyLanes, HeadLanes, PointLanes, V3};
+use tumble_core::layout::StepParams;
+use wide::f32x4;
+
+#[inline(always)]
+pub(super) fn warm_start(head: &HeadLanes, points: &[PointLanes], a: &mut BodyLanes, b: &mut BodyLanes) {
+    let (normal, [t1, t2]) = (head.normal, head.tangents);
+    for p in points {
+        let push = p.normal * normal + p.tangent[0] * t1 + p.tangent[1] * t2;
+        apply(a, b, p.anchor_a, p.anchor_b, push);
+    }
+}
+
+/// Gaps at one point of each.
+#[inline(always)]
+pub(super) fn separation(head: &HeadLanes, p: &PointLanes, a: &BodyLanes, b: &BodyLanes) -> f32x4 {
+    let core_a = p.anchor_a - head.round_a * head.normal;
+    let core_b = p.anchor_b - head.round_b * head.normal;
+    let moved = b.translation - a.translation + b.turned(core_b) - a.turned(core_a);
+    p.adjusted_separation + head.normal.dot(moved)
+}
+
+#[inline(always)]
+pub(super) fn push_tangent(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLanes, b: &mut BodyLanes) {
+    let ([t1, t2], ra, rb) = (head.tangents, p.anchor_a, p.anchor_b);
+    let slide = b.velocity_at(rb) - a.velocity_at(ra);
+    let x = p.tangent[0] - p.tangent_mass * t1.dot(slide);
+    let y = p.tangent[1] - p.tangent_mass * t2.dot(slide);
+    let length = (x * x + y * y).sqrt();
+    let most = head.friction * p.normal;
+    let scale = length.simd_gt(most).bitselect(most / length, f32x4::ONE);
+    let (x, y) = (x * scale, y * scale);
+    let push = (x - p.tangent[0]) * t1 + (y - p.tangent[1]) * t2;
+    let good = push.x.is_finite() & push.y.is_finite() & push.z.is_finite();
+    let push = V3::new(good & push.x, good & push.y, good & push.z);
+    p.tangent = [good.bitselect(x, p.tangent[0]), good.bitselect(y, p.tangent[1])];
+    apply(a, b, ra, rb, push);
+}
+
+#[inline(always)]
+pub(super) fn bounce(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLanes, b: &mut BodyLanes, step: &StepParams) {
+    let (restitution, normal) = (head.restitution, head.normal);
+    let threshold = f32x4::splat(-step.restitution_threshold);
+    let bounces =
+        restitution.simd_gt(f32x4::ZERO) & !p.approach.simd_gt(threshold) & p.max_impulse.simd_gt(f32x4::ZERO);
+    let velocity = normal.dot(b.velocity_at(p.anchor_b) - a.velocity_at(p.anchor_a));
+    let change = -p.normal_mass * (velocity + restitution * p.approach);
+    let sum = p.normal + change;
+    let new = sum.fast_max(f32x4::ZERO);
+    let push = new - p.normal;
+    let good = bounces & sum.is_finite();
+    p.normal = good.bitselect(new, p.normal);
+    apply(a, b, p.anchor_a, p.anchor_b, (good & push) * normal);
+}
+
+#[inline(always)]
+pub(super) fn apply(a: &mut BodyLanes, b: &mut BodyLanes, ra: V3, rb: V3, push: V3) {
+    a.linear = a.linear - a.inverse_mass * push;
+    a.angular = a.angular - a.inverse_inertia_times(ra.cross(push));
+    b.linear = b.linear + b.inverse_mass * push;
+    b.angular = b.angular + b.inverse_inertia_times(rb.cross(push));
+}
