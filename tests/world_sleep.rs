@@ -195,9 +195,9 @@ fn a_blow_reaches_the_sleeper() {
 /// Oracle: no body lies below the floor or deeper in another than where nothing sleeps, up to half as much again.
 #[test]
 fn a_pile_of_sleepers_is_hit() {
-    let scene = scenes::pile(120);
+    let scene = scenes::pile(60);
     for side in SIDES {
-        let mut world = settled(side, &scene, 120);
+        let mut world = settled(side, &scene, 60);
         let mut wakeful = side.world(&scene, &Params::default());
         steps(&mut wakeful, report(&mut world).step as usize);
         let top = world.poses().unwrap().iter().map(|pose| pose.translation.y).fold(0.0, f32::max);
@@ -210,7 +210,7 @@ fn a_pile_of_sleepers_is_hit() {
             world.edit().insert(body, collider).unwrap();
         }
         steps(&mut world, 10);
-        assert_eq!(counts(&report(&mut world)), (120, 1, 1), "{side:?}: still in the air");
+        assert_eq!(counts(&report(&mut world)), (60, 1, 1), "{side:?}: still in the air");
         steps(&mut wakeful, 10);
         let mut deepest = [0.0f64; 2];
         for _ in 0..12 {
@@ -312,8 +312,10 @@ fn the_same_bits_every_time() {
     for side in SIDES {
         let expected = life(side.world(&scene, &asleep_params()));
         assert_eq!(life(side.world(&scene, &asleep_params())), expected, "{side:?}: run again");
-        for broadphase in [Broadphase::BruteForce, Broadphase::SlicedGrid, Broadphase::Lbvh, Broadphase::SweepAndPrune]
-        {
+        // Those that keep a tree from step to step must hear of sleepers; the others are here where a step is cheap.
+        let rest = [Broadphase::BruteForce, Broadphase::SlicedGrid, Broadphase::SweepAndPrune];
+        let rest = if side == Side::Cpu { &rest[..] } else { &[] };
+        for broadphase in rest.iter().copied().chain([Broadphase::Lbvh]) {
             let params = Params { broadphase, ..asleep_params() };
             assert_eq!(life(side.world(&scene, &params)), expected, "{side:?}: {broadphase}");
         }

@@ -74,8 +74,7 @@ pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<PackedBody> {
     let rotation = builder.rotation.normalize();
     let state = BodyState {
         position: (builder.translation + rotation * mass.center_of_mass).to_array(),
-        flags: body_kind(builder.body_type)
-            | if dynamic && !builder.can_sleep { body_flags::STAYS_AWAKE } else { 0 },
+        flags: body_kind(builder.body_type) | if dynamic && !builder.can_sleep { body_flags::STAYS_AWAKE } else { 0 },
         rotation: (rotation * mass.principal_frame).normalize().to_array(),
         linear_velocity: if builder.body_type == RigidBodyType::Fixed { [0.0; 3] } else { builder.linvel.to_array() },
         generation: body.generation(),

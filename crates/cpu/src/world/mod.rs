@@ -5,10 +5,10 @@ mod contacts;
 mod kept;
 mod queries;
 
-use asleep::Asleep;
 use crate::broadphase::Finder;
 use crate::query;
 use crate::solver::Rows;
+use asleep::Asleep;
 use bytemuck::Zeroable;
 use glam::Vec3;
 use kept::{Asked, Kept, Overflow};
