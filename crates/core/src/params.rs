@@ -106,7 +106,8 @@ impl Default for Capacities {
 pub struct Sleep {
     /// How far a point of the surface may stray while its body is at rest, m.
     pub distance: f32,
-    /// How long all bodies of an island must have been at rest, s.
+    /// How long all bodies of an island must have been at rest, s. Less than some tenths may catch one at the top of its
+    /// flight.
     pub time: f32,
 }
 
@@ -122,7 +123,7 @@ impl Sleep {
         let what = || "Params".to_string();
         let Self { distance, time } = *self;
         check((1e-6..=1e3).contains(&distance), what, "sleep.distance", distance, "1e-6 to 1000 m")?;
-        check((0.0..=1e6).contains(&time), what, "sleep.time", time, "0 to 1e6 s")
+        check((1e-3..=1e6).contains(&time), what, "sleep.time", time, "0.001 to 1e6 s")
     }
 }
 
