@@ -3,22 +3,25 @@
 //
 // Harada, "Parallelizing the Physics Pipeline" (GDC 2009): each constraint without a batch writes itself to its
 // bodies; one that reads itself on both keeps the batch. There the last writer wins; here the lowest hashed index does
-// (an atomic minimum), so that the result depends on the constraints alone and every round places at least one. A
-// winner takes the lowest batch that neither body is in. Constraints keep their batch while they touch; fixed,
+// (an atomic minimum), so that the result depends on the constraints alone. By write-and-verify, the talk's own law, a
+// winner joins the batch that is being filled, a few rounds a batch; else it takes the lowest batch that neither body
+// is in, and every round places at least one. Persistent constraints keep their batch while they touch; fixed,
 // kinematic and frozen bodies never conflict. What the rounds leave goes to the last batch, solved in sequence.
+// Contacts with what does not move can be had last: they then take the highest free batch instead of the lowest.
 //
 //   begin      one thread a pair: keeps its batch, or puts the pair on the list `unplaced`. Reads next_pairs,
 //              manifolds, batch_of_slot; writes pair_batch, masks
 //   bid        one thread an entry of the list: claims its bodies; one that finds no batch free joins the last one.
 //              Reads next_pairs; writes claims, pair_batch, masks
-//   place      the same: who holds both bodies takes the lowest free batch. The host runs 8 rounds of these two.
-//              Reads next_pairs, claims; writes pair_batch, masks
+//   place      the same: who holds both bodies takes the batch. The host runs 8 rounds of these two, or 60 to write and
+//              verify. Reads next_pairs, claims; writes pair_batch, masks
+//   unclaim    one thread a body: clears claims, for write-and-verify, whose rounds are too many for their bits
 //   compact    the same: who still waits goes on a shorter list (in `batch_order`, which is not yet in use)
 //   tail       one workgroup, one thread each 256th entry of that list: bids and places in more rounds
 //   finish     one thread a pair: who still waits joins the last batch; batch_keys and batch_order, to be sorted
 //   degree     one thread a body: how many batches it is in, from masks
 //   (primitives/sort of batch_keys with batch_order)
-//   table      one thread a batch: its first constraint, from batch_keys
+//   table      one thread a batch: its first constraint, from batch_keys; those that nobody is in come behind the others
 //   gate       one workgroup: what the step reports, whether it may go on, and dispatch_args for the solver
 //
 // All count in `counters`. What the rounds do to the graph is in shared/graph.wgsl.
@@ -30,9 +33,9 @@
 //#import shared/thread.wgsl
 
 const PENDING: u32 = 254u; // in place of a batch: wants one
-const WIDE_ROUNDS: u32 = 8u; // rounds over all entries at once; crates/core/src/limits.rs
+const WIDE_ROUNDS: u32 = 8u; // rounds over all entries at once, but for write-and-verify; crates/core/src/limits.rs
 const BATCH_ROUNDS: u32 = 62u; // and most rounds in all
-const COUNTER_RECOLOR_NEXT: u32 = 31u; // scratch words of the counters
+const COUNTER_NEXT_COLORED_AS: u32 = 31u; // scratch words of the counters
 const COUNTER_LEFT: u32 = 109u;
 
 // Elements of `dispatch_args`. Those below are the batches that have a dispatch of their own.
@@ -67,6 +70,7 @@ var<workgroup> entries_left: u32;
 var<workgroup> still_pending: atomic<u32>;
 var<workgroup> any_pending: u32;
 var<workgroup> highest_degree: atomic<u32>;
+var<workgroup> firsts: array<u32, 65>; // of each batch, and the end
 
 // Where on a list whose length is in `counters[word]` this invocation's element goes, if it `wants` one. The order is
 // the atomics', and nothing depends on it. To be called by all invocations of a workgroup, once in a dispatch.
@@ -97,7 +101,7 @@ fn begin(
         if manifolds[i].count > 0u {
             batch = PENDING;
             let pair = next_pairs[i];
-            if (pair.kind & PAIR_FRESH) == 0u && atomicLoad(&counters[CONTROL_RECOLOR]) == 0u {
+            if (pair.kind & PAIR_FRESH) == 0u && atomicLoad(&counters[CONTROL_COLORED_AS]) == step.batching {
                 let kept = batch_of_slot[pair.slot];
                 if kept < LAST_BATCH {
                     batch = kept;
@@ -131,7 +135,7 @@ fn bid(
     if atomicLoad(&counters[CONTROL_ROUNDS]) <= round.index {
         atomicMax(&counters[CONTROL_ROUNDS], round.index + 1u);
     }
-    bid_for(pair, round.index);
+    bid_for(pair, round.index, step.batching);
 }
 
 @compute @workgroup_size(256)
@@ -146,7 +150,19 @@ fn place(
     }
     let pair = unplaced[k];
     if pair_batch[pair] == PENDING {
-        place_if_held(pair, round.index);
+        place_if_held(pair, round.index, step.batching);
+    }
+}
+
+@compute @workgroup_size(256)
+fn unclaim(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i < step.body_count {
+        atomicStore(&claims[i], 0xffffffffu);
     }
 }
 
@@ -169,12 +185,17 @@ fn compact(
     }
 }
 
+fn wide_rounds() -> u32 {
+    return select(WIDE_ROUNDS, VERIFY_ROUNDS, verifies(step.batching));
+}
+
 // How many rounds one workgroup may add: loops of no more than 2 x 24,000 turns and a few.
 fn tail_rounds(left: u32) -> u32 {
-    if step.batch_rounds <= WIDE_ROUNDS {
+    if step.batch_rounds <= wide_rounds() {
         return 0u;
     }
-    return min(BATCH_ROUNDS - WIDE_ROUNDS, 24000u / max((left + WORKGROUP - 1u) / WORKGROUP, 1u));
+    let most = select(BATCH_ROUNDS - WIDE_ROUNDS, VERIFY_ROUNDS, verifies(step.batching));
+    return min(most, 24000u / max((left + WORKGROUP - 1u) / WORKGROUP, 1u));
 }
 
 @compute @workgroup_size(256)
@@ -187,21 +208,21 @@ fn tail(@builtin(local_invocation_index) lid: u32) {
     if left == 0u {
         return;
     }
-    let end = WIDE_ROUNDS + tail_rounds(left);
-    for (var index = WIDE_ROUNDS; index < end; index++) {
+    let end = wide_rounds() + tail_rounds(left);
+    for (var index = wide_rounds(); index < end; index++) {
         if local == 0u {
             atomicMax(&counters[CONTROL_ROUNDS], index + 1u);
         }
         for (var k = local; k < left; k += WORKGROUP) {
             let pair = batch_order[k];
             if pair_batch[pair] == PENDING {
-                bid_for(pair, index);
+                bid_for(pair, index, step.batching);
             }
         }
         storageBarrier();
         for (var k = local; k < left; k += WORKGROUP) {
             let pair = batch_order[k];
-            if pair_batch[pair] == PENDING && !place_if_held(pair, index) {
+            if pair_batch[pair] == PENDING && !place_if_held(pair, index, step.batching) {
                 atomicOr(&still_pending, 1u);
             }
         }
@@ -259,16 +280,7 @@ fn degree(
 }
 
 // The first of the sorted keys that is no lower than the batch; UNBATCHED, which is above all, ends the last batch.
-@compute @workgroup_size(256)
-fn table(
-    @builtin(workgroup_id) wg: vec3<u32>,
-    @builtin(num_workgroups) num: vec3<u32>,
-    @builtin(local_invocation_index) lid: u32,
-) {
-    let batch = invocation(wg, num, lid);
-    if batch > BATCHES {
-        return;
-    }
+fn first_of(batch: u32) -> u32 {
     var low = 0u;
     var high = atomicLoad(&counters[CONTROL_PAIR_COUNT]);
     for (var turn = 0u; turn < 32u && low < high; turn++) {
@@ -279,7 +291,37 @@ fn table(
             high = middle;
         }
     }
-    atomicStore(&counters[CONTROL_BATCH_START + batch], low);
+    return low;
+}
+
+@compute @workgroup_size(256)
+fn table(@builtin(local_invocation_index) lid: u32) {
+    let batch = local_index(lid);
+    if batch <= BATCHES {
+        firsts[batch] = first_of(batch);
+    }
+    workgroupBarrier();
+    if batch > BATCHES {
+        return;
+    }
+    var place = batch;
+    var first = firsts[batch];
+    if batch < LAST_BATCH {
+        var below = 0u;
+        var used = 0u;
+        for (var other = 0u; other < LAST_BATCH; other++) {
+            if firsts[other] < firsts[other + 1u] {
+                used++;
+                below += select(0u, 1u, other < batch);
+            }
+        }
+        place = below;
+        if first == firsts[batch + 1u] {
+            place = used + batch - below;
+            first = firsts[LAST_BATCH];
+        }
+    }
+    atomicStore(&counters[CONTROL_BATCH_START + place], first);
 }
 
 fn start_of(batch: u32) -> u32 {
@@ -316,7 +358,7 @@ fn args_for(element: u32) -> vec4<u32> {
 
 // Whether bodies lost so many constraints that batches stand half empty: the next step colours anew.
 fn wasteful(batch_count: u32, max_degree: u32) -> bool {
-    return batch_count > 2u * max_degree;
+    return batch_count > select(2u, 3u, (step.batching & BATCHING_STATIC_LAST) != 0u) * max_degree;
 }
 
 @compute @workgroup_size(256)
@@ -341,12 +383,13 @@ fn gate(@builtin(local_invocation_index) lid: u32) {
             batch_count = batch + 1u;
         }
     }
-    let recolor = wasteful(batch_count, atomicLoad(&counters[CONTROL_MAX_DEGREE]));
+    let kept = (step.batching & BATCHING_LAW) == BATCHING_PERSISTENT
+        && !wasteful(batch_count, atomicLoad(&counters[CONTROL_MAX_DEGREE]));
     atomicStore(&counters[CONTROL_BATCH_COUNT], batch_count);
     atomicStore(&counters[CONTROL_LAST_COUNT], last_count);
     atomicStore(&counters[CONTROL_SOLVED], start_of(BATCHES));
     atomicStore(&counters[CONTROL_UNPLACED], 0u);
-    atomicStore(&counters[COUNTER_RECOLOR_NEXT], select(0u, 1u, recolor));
+    atomicStore(&counters[COUNTER_NEXT_COLORED_AS], select(0u, step.batching, kept));
     if too_many && atomicLoad(&counters[CONTROL_STOP]) == 0u {
         atomicStore(&counters[CONTROL_STOP], 1u);
         atomicStore(&counters[CONTROL_OVERFLOW], OVERFLOW_LAST_BATCH);

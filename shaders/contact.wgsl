@@ -32,7 +32,7 @@
 const NO_FEATURE: u32 = 0xffffffffu;
 
 // Words in which the step left what outlives it.
-const NEXT_RECOLOR: u32 = 31u;
+const NEXT_COLORED_AS: u32 = 31u;
 const NEXT_FROZEN_COUNT: u32 = 108u;
 
 @group(0) @binding(0) var<uniform> step: StepParams;
@@ -271,6 +271,6 @@ fn commit_counts(@builtin(local_invocation_index) lid: u32) {
     atomicAdd(&counters[CONTROL_FREE_COUNT], dead - fresh);
     atomicStore(&counters[CONTROL_OLD_PAIR_COUNT], atomicLoad(&counters[CONTROL_PAIR_COUNT]));
     atomicStore(&counters[CONTROL_STEP], step.step);
-    atomicStore(&counters[CONTROL_RECOLOR], atomicLoad(&counters[NEXT_RECOLOR]));
+    atomicStore(&counters[CONTROL_COLORED_AS], atomicLoad(&counters[NEXT_COLORED_AS]));
     atomicStore(&counters[CONTROL_FROZEN_COUNT], atomicLoad(&counters[NEXT_FROZEN_COUNT]));
 }

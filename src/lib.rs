@@ -33,17 +33,17 @@ pub use tumble_gpu as gpu;
 
 pub use tumble_core as core;
 pub use tumble_core::{
-    BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Contact, ContactPoint, Contacts,
-    Editor, Error, Inserted, MortonBits, Nearest, NearestQuery, OnePass, Overlap, OverlapShape, Overlaps, Params, Pose,
-    Poses, Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, Sleep, Soft, Solver, StepReport,
-    Traversal, Velocities, Velocity,
+    Batching, BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Contact, ContactPoint,
+    Contacts, Editor, Error, Inserted, MortonBits, Nearest, NearestQuery, OnePass, Overlap, OverlapShape, Overlaps,
+    Params, Pose, Poses, Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, Sleep, Soft, Solver,
+    StepReport, Traversal, Velocities, Velocity,
 };
 pub use world::{Backend, World};
 
 /// What most programs need.
 pub mod prelude {
     pub use crate::{
-        Backend, BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Contact,
+        Backend, Batching, BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Contact,
         ContactPoint, Contacts, Error, Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Params, Pose, Poses,
         Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, Sleep, StepReport, Velocities, Velocity,
         World,

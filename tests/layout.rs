@@ -88,15 +88,15 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         FoundManifold { rotation_a, rotation_b, manifold }
         ConstraintHead {
             normal, friction, body_a, body_b, slot, count, restitution, bias_rate, mass_scale, impulse_scale,
-            remembered, round_a, round_b, pad_a
+            remembered, round_a, round_b, pad_a, between, pad_b
         }
         ConstraintPoint {
-            anchor_a, adjusted_separation, anchor_b, normal_mass, tangent_mass, approach, max_impulse, pad_a
+            anchor, adjusted_separation, normal_mass, tangent_mass, approach, deviation, total, pad_b
         }
         Impulse { normal, tangent, feature }
-        ManifoldMemory { remembered, pad_a, pad_b, pad_c }
+        ManifoldMemory { remembered, pad_a, pad_b, pad_c, deviations, totals }
         Control {
-            stop, overflow, needed, step, old_pair_count, free_count, recolor, frozen_count, pair_count, processed,
+            stop, overflow, needed, step, old_pair_count, free_count, colored_as, frozen_count, pair_count, processed,
             new_count, dead_count, constraint_count, point_count, batch_count, rounds, unplaced, last_count,
             large_count, max_degree, solved, turns, cell_class, cell_bits, center_min, inverse_cell, center_max,
             pad_a, batch_start, quarantined, pad_b, islands, islands_open, asleep, islands_asleep,
@@ -117,7 +117,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             speculative_distance, restitution_threshold, body_count, collider_count, pair_capacity, cell_table_bits,
             large_limit, edit_ranges, drop_pair, write_poses, batch_rounds, last_limit, wide_batches,
             static_bias_rate, static_mass_scale, static_impulse_scale, memory_gain, memory_limit,
-            memory_band, blow_speed, solver, sleep_distance, sleep_time, wake_all
+            memory_band, blow_speed, solver, batching, sleep_distance, sleep_time, wake_all, pad_a, pad_b, pad_c
         }
     })
 }
@@ -149,6 +149,7 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
         }
         query_word as "QUERY_" { UNBOUNDED, TURNS, TOTAL, COUNT }
         tree_members as "MEMBERS_" { MOVING, FIXED, LARGE, ALL }
+        batching as "BATCHING_" { WRITE_AND_VERIFY, LOWEST_FREE, PERSISTENT, LAW, STATIC_LAST }
         ;
         BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT, NO_NODE, NO_COLLIDER
     }

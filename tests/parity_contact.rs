@@ -28,7 +28,7 @@ const OLD_PAIR_COUNT: u32 = 4;
 const PAIR_COUNT: u32 = 8;
 const NEW_COUNT: u32 = 10;
 const DEAD_COUNT: u32 = 11;
-const NEXT_RECOLOR: usize = 31;
+const NEXT_COLORED_AS: usize = 31;
 const NEXT_FROZEN: usize = 108;
 
 /// What lives from step to step, on the CPU.
@@ -224,7 +224,7 @@ fn pairs_keep_their_slots_over_steps() {
             overwrite(&alone, "manifolds", &input.manifolds);
             overwrite(&alone, "pair_batch", &input.batches);
             set_control(&mut alone, |words| {
-                (words[0], words[NEXT_RECOLOR], words[NEXT_FROZEN]) = (1, number % 2, 10 * number);
+                (words[0], words[NEXT_COLORED_AS], words[NEXT_FROZEN]) = (1, number % 2, 10 * number);
             });
             alone.run(commit);
             kept.check(&alone, &format!("{what}, stopped"));
@@ -233,7 +233,7 @@ fn pairs_keep_their_slots_over_steps() {
             kept.commit(&matched, &input);
             kept.check(&alone, &what);
             let control: Control = alone.take("counters")[0];
-            let told = [control.step, control.recolor, control.frozen_count];
+            let told = [control.step, control.colored_as, control.frozen_count];
             assert_eq!(told, [number, number % 2, 10 * number], "{what}");
         }
     }

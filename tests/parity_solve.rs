@@ -31,13 +31,14 @@ mod off {
     // A gap is divided by the sub-step, 240 to the second: its last bit is 3e-5 m/s. Velocities, impulses, approach.
     // 3.5e-5 3.1e-5 6.3e-6
     pub(crate) const SWEEP: [Field; 3] = [("velocity", 3e-4), ("impulse", 3e-4), ("approach", 1e-4)];
-    // 7.0e-5 6.0e-5 4.3e-5
-    pub(crate) const LONG: [Field; 3] = [("velocity", 1e-1), ("impulse", 1e-1), ("approach", 1e-1)];
-    // 8.2e-5 1.1e-4 8.0e-5
-    pub(crate) const STEP: [Field; 3] = [("velocity", 1e-1), ("impulse", 1e-1), ("approach", 1e-1)];
-    pub(crate) const WEIGHT: Field = ("weight", 1e-3);
-    pub(crate) const STEP_WAY: Field = ("translation", 1e-5); // 2.2e-7
-    pub(crate) const STEP_TURN: Field = ("turn", 1e-5); // 2.5e-7
+    // 1.3e-4 8.2e-3 1.2e-4
+    pub(crate) const LONG: [Field; 3] = [("velocity", 5e-4), ("impulse", 2e-2), ("approach", 5e-4)];
+    // Three sub-steps of eight: the last bit decides which contact closes a gap and which one presses, and in a
+    // heap of 3,000 bodies some decide otherwise. (Soft, four: 8.2e-5 1.1e-4 8.0e-5.) 1.7e-2 2.0e-2 2.3e-2
+    pub(crate) const STEP: [Field; 3] = [("velocity", 5e-2), ("impulse", 5e-2), ("approach", 5e-2)];
+    pub(crate) const WEIGHT: Field = ("weight", 1e-5); // 0
+    pub(crate) const STEP_WAY: Field = ("translation", 2e-4); // 6.0e-5
+    pub(crate) const STEP_TURN: Field = ("turn", 3e-4); // 8.1e-5
 }
 
 fn check_solver(
@@ -70,9 +71,13 @@ fn check_solver(
     floats.check(what, impulse, (&changes(&impulses[0]), &changes(&impulses[1])), |change| *change);
     assert!(impulses[0].iter().map(|i| i.feature).eq(impulses[1].iter().map(|i| i.feature)), "{what}: features");
     let both = (&used(&cpu.1.heads, &cpu.1.points)[..], &used(&cpu.1.heads, &gpu.1.points)[..]);
-    let highest =
-        |points: &[ConstraintPoint]| -> Vec<f32> { points.iter().zip(&mass).map(|(p, m)| p.max_impulse / m).collect() };
-    floats.check(what, impulse, (&highest(both.0), &highest(both.1)), |x| [*x]);
+    let more =
+        |points: &[ConstraintPoint]| -> Vec<f32> { points.iter().zip(&mass).map(|(p, m)| p.deviation / m).collect() };
+    floats.check(what, impulse, (&more(both.0), &more(both.1)), |x| [*x]);
+    let totals = |points: &[ConstraintPoint]| -> Vec<[f32; 3]> {
+        points.iter().zip(&mass).map(|(p, m)| p.total.map(|total| total / m)).collect()
+    };
+    floats.check(what, impulse, (&totals(both.0), &totals(both.1)), |x| *x);
     floats.check(what, approach, both, |p| [p.approach]);
 }
 
@@ -108,7 +113,7 @@ fn prepare_builds_the_mirrors_rows() {
             let heads = &rows.heads;
             assert!(used(heads, &rows.impulses) == used(heads, &stage.rows.impulses), "{what}: impulses");
             let both = (&used(heads, &stage.rows.points)[..], &used(heads, &rows.points)[..]);
-            let exact = |p: &ConstraintPoint| (p.anchor_a, p.anchor_b, p.max_impulse, p.pad_a);
+            let exact = |p: &ConstraintPoint| (p.anchor, p.total, p.deviation, p.pad_b);
             assert!(both.0.iter().map(exact).eq(both.1.iter().map(exact)), "{what}: points");
             floats.check(&what, off::SEPARATION, both, |p| [p.adjusted_separation]);
             floats.check(&what, off::MASSES, both, |p| [p.normal_mass, p.tangent_mass]);
@@ -116,7 +121,7 @@ fn prepare_builds_the_mirrors_rows() {
 
             let unused = |head: &ConstraintHead| 4 - head.count as usize;
             let mark = u32::from_ne_bytes([mark; 4]);
-            let marked = rows.points.iter().filter(|p| p.pad_a == mark).count();
+            let marked = rows.points.iter().filter(|p| p.pad_b == mark).count();
             assert_eq!(marked, heads.iter().map(unused).sum::<usize>(), "{what}: only points in use are written");
             assert_eq!(rows.impulses.iter().filter(|i| i.feature == mark).count(), marked, "{what}: impulses too");
         }
@@ -188,7 +193,8 @@ fn a_long_last_batch_is_visited_to_its_end() {
 fn a_whole_step_of_sweeps_stays_together() {
     let mut alones = PERMUTATIONS.map(Alone::new);
     let mut floats = Floats::default();
-    for (what, stage) in solvers().into_iter().flat_map(|(solver, _)| Stage::all_by(solver)) {
+    for (what, mut stage) in solvers().into_iter().flat_map(|(solver, _)| Stage::all_by(solver)) {
+        stage.frame.step.substeps = 3;
         let (mut bodies, mut rows) = (stage.bodies.clone(), stage.rows.clone());
         let moving = Bodies { solver: &mut bodies, states: &stage.frame.states, props: &stage.cpu.props };
         solve_plain(&mut rows, moving, &stage.frame.step, true);

@@ -15,17 +15,19 @@ struct ConstraintHead {
     round_a: f32,
     round_b: f32,
     pad_a: u32,
+    between: vec3<f32>,
+    pad_b: u32,
 }
 
 struct ConstraintPoint {
-    anchor_a: vec3<f32>,
+    anchor: vec3<f32>,
     adjusted_separation: f32,
-    anchor_b: vec3<f32>,
     normal_mass: f32,
     tangent_mass: f32,
     approach: f32,
-    max_impulse: f32,
-    pad_a: u32,
+    deviation: f32,
+    total: vec3<f32>,
+    pad_b: u32,
 }
 
 // An array, not a vec2: that would be aligned to 8 bytes and the struct would not be 16.
@@ -40,4 +42,6 @@ struct ManifoldMemory {
     pad_a: u32,
     pad_b: u32,
     pad_c: u32,
+    deviations: array<f32, 4>,
+    totals: array<array<f32, 3>, 4>,
 }

@@ -23,7 +23,7 @@ const CONTROL_NEEDED: u32 = 2u;
 const CONTROL_STEP: u32 = 3u;
 const CONTROL_OLD_PAIR_COUNT: u32 = 4u;
 const CONTROL_FREE_COUNT: u32 = 5u;
-const CONTROL_RECOLOR: u32 = 6u;
+const CONTROL_COLORED_AS: u32 = 6u;
 const CONTROL_FROZEN_COUNT: u32 = 7u;
 const CONTROL_PAIR_COUNT: u32 = 8u;
 const CONTROL_PROCESSED: u32 = 9u;
@@ -60,7 +60,7 @@ struct Control {
     step: u32,
     old_pair_count: u32,
     free_count: u32,
-    recolor: u32,
+    colored_as: u32,
     frozen_count: u32,
     pair_count: u32,
     processed: u32,

@@ -1,13 +1,17 @@
 // The graph of constraints and the batches that bodies are in: what a round of stage `batch` does to them.
 // Twin of crates/cpu/src/batch.rs.
 //
-// Reads next_pairs and, for which body a collider is on and whether that moves, the boxes in aabbs; reads and writes
-// pair_batch (a batch a pair), masks (a bit a batch, two words a body) and claims (one a body).
+// Passes hand over `batching`, of the step. Reads next_pairs and, for which body a collider is on and whether that
+// moves, the boxes in aabbs; reads and writes pair_batch (a batch a pair), masks (a bit a batch, two words a body) and
+// claims (one a body).
 
 //#import shared/collider.wgsl
 //#import shared/control.wgsl
 //#import shared/pair.wgsl
+//#import shared/step.wgsl
 
+const TRIES: u32 = 3u; // rounds in which write-and-verify fills one batch; crates/core/src/limits.rs
+const VERIFY_ROUNDS: u32 = 60u; // and all its rounds that share claims
 const NO_BODY: u32 = 0xffffffffu; // in place of a body that never conflicts
 
 // The moving bodies of a pair.
@@ -31,9 +35,15 @@ fn hash26(x: u32) -> u32 {
     return h ^ (h >> 13u);
 }
 
-// Claim of a constraint in a round: later rounds undercut earlier ones, so that claims need no clearing.
-fn claim(pair: u32, round_index: u32) -> u32 {
-    return ((63u - round_index) << 26u) | hash26(pair);
+fn verifies(batching: u32) -> bool {
+    return (batching & BATCHING_LAW) == BATCHING_WRITE_AND_VERIFY;
+}
+
+// Claim of a constraint in a round: later rounds undercut earlier ones, so that claims need no clearing but once
+// in write-and-verify, which has more rounds.
+fn claim(pair: u32, round_index: u32, batching: u32) -> u32 {
+    let turn = select(round_index, round_index % VERIFY_ROUNDS, verifies(batching));
+    return ((63u - turn) << 26u) | hash26(pair);
 }
 
 fn end_of(collider: u32) -> u32 {
@@ -67,12 +77,25 @@ fn taken(at: Ends, word: u32) -> u32 {
     return bits;
 }
 
-fn lowest_free(at: Ends) -> u32 {
-    let low = taken(at, 0u);
-    if low != 0xffffffffu {
-        return countTrailingZeros(~low);
+// The batch that a constraint may join in this round: UNBATCHED when there is none in this one, LAST_BATCH when there
+// will be none.
+fn wanted(at: Ends, round_index: u32, batching: u32) -> u32 {
+    let from_above = (batching & BATCHING_STATIC_LAST) != 0u && (at.a == NO_BODY || at.b == NO_BODY);
+    if verifies(batching) {
+        let filling = round_index / TRIES;
+        let batch = select(filling, LAST_BATCH - 1u - filling, from_above);
+        let is_free = ((taken(at, batch / 32u) >> (batch % 32u)) & 1u) == 0u;
+        return select(UNBATCHED, batch, is_free);
     }
-    return 32u + countTrailingZeros(~taken(at, 1u));
+    let low = ~taken(at, 0u);
+    let high = ~taken(at, 1u) & 0x7fffffffu;
+    if from_above && high != 0u {
+        return 32u + firstLeadingBit(high);
+    }
+    if low != 0u {
+        return select(firstTrailingBit(low), firstLeadingBit(low), from_above);
+    }
+    return select(LAST_BATCH, 32u + firstTrailingBit(high), high != 0u);
 }
 
 fn holds(at: Ends, bidden: u32) -> bool {
@@ -83,28 +106,33 @@ fn holds(at: Ends, bidden: u32) -> bool {
 }
 
 // Masks only fill: one that finds none free never will, and must not stand in its neighbours' way.
-fn bid_for(pair: u32, round_index: u32) {
+fn bid_for(pair: u32, round_index: u32, batching: u32) {
     let at = ends(pair);
-    if lowest_free(at) >= LAST_BATCH {
+    let batch = wanted(at, round_index, batching);
+    if batch == UNBATCHED {
+        return;
+    }
+    if batch == LAST_BATCH {
         pair_batch[pair] = LAST_BATCH;
         join(at, LAST_BATCH);
         return;
     }
+    let bidden = claim(pair, round_index, batching);
     if at.a != NO_BODY {
-        atomicMin(&claims[at.a], claim(pair, round_index));
+        atomicMin(&claims[at.a], bidden);
     }
     if at.b != NO_BODY {
-        atomicMin(&claims[at.b], claim(pair, round_index));
+        atomicMin(&claims[at.b], bidden);
     }
 }
 
 // Winners of one round share no moving body, so that each alone reads and fills the masks of its own.
-fn place_if_held(pair: u32, round_index: u32) -> bool {
+fn place_if_held(pair: u32, round_index: u32, batching: u32) -> bool {
     let at = ends(pair);
-    if !holds(at, claim(pair, round_index)) {
+    if !holds(at, claim(pair, round_index, batching)) {
         return false;
     }
-    let batch = lowest_free(at);
+    let batch = wanted(at, round_index, batching);
     pair_batch[pair] = batch;
     join(at, batch);
     return true;

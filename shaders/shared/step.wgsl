@@ -1,5 +1,12 @@
 // What one step is told, as a uniform. Fields and units: crates/core/src/layout/step.rs.
 
+// `batching`: a law, and flags.
+const BATCHING_WRITE_AND_VERIFY: u32 = 1u;
+const BATCHING_LOWEST_FREE: u32 = 2u;
+const BATCHING_PERSISTENT: u32 = 3u;
+const BATCHING_LAW: u32 = 3u;
+const BATCHING_STATIC_LAST: u32 = 4u;
+
 const SOLVER_ONE_PASS: u32 = 0u;
 const SOLVER_SOFT: u32 = 1u;
 
@@ -35,7 +42,11 @@ struct StepParams {
     memory_band: f32,
     blow_speed: f32,
     solver: u32,
+    batching: u32,
     sleep_distance: f32,
     sleep_time: f32,
     wake_all: u32,
+    pad_a: u32,
+    pad_b: u32,
+    pad_c: u32,
 }

@@ -5,6 +5,8 @@
 
 // Share of the memory that is left, each sub-step, of a contact that does not push.
 const FADE: f32 = 0.9;
+// What a point has more or less than the mean is remembered at this times the square of the mean's rate.
+const DEVIATION: f32 = 2.5;
 
 fn over(square: f32, mass: f32) -> f32 {
     if mass > 0.0 {
@@ -44,20 +46,17 @@ fn pass_normal(
     step: StepParams,
 ) {
     let normal = head.normal;
-    let ra = (*point).anchor_a;
-    let rb = (*point).anchor_b;
-    let velocity = dot(normal, relative_velocity(a, b, ra, rb));
+    let r = arms(head, point);
+    let velocity = dot(normal, relative_velocity(a, b, r[0], r[1]));
     let separation = separation_of(head, point, a, b);
-    if (*point).max_impulse == 0.0 {
-        (*point).approach = min((*point).approach, velocity);
-    }
     let mass = (*point).normal_mass;
-    let pressed = (*impulse).normal > 0.0 && separation * mass < step.memory_band * head.remembered;
+    let remembered = head.remembered + (*point).deviation;
+    let pressed = (*impulse).normal > 0.0 && separation * mass < step.memory_band * remembered;
     var change = 0.0;
     if separation > 0.0 && !pressed {
         change = -mass * (velocity + separation * step.inverse_h);
     } else {
-        let leak = head.impulse_scale * ((*impulse).normal - head.remembered);
+        let leak = head.impulse_scale * ((*impulse).normal - remembered);
         let spring = head.mass_scale * mass * head.bias_rate * separation;
         let pull = max(spring + leak, -step.push_speed * mass);
         change = -(head.mass_scale * mass * velocity + pull);
@@ -68,39 +67,46 @@ fn pass_normal(
         let new_normal = max(sum, 0.0);
         let push = new_normal - (*impulse).normal;
         (*impulse).normal = new_normal;
-        (*point).max_impulse = max((*point).max_impulse, new_normal);
-        apply(a, b, ra, rb, push * normal);
+        apply(a, b, r[0], r[1], push * normal);
+        // Without the last sub-step's gravity: a bounce must not gain by it.
+        if new_normal == 0.0 && (*point).total.x == 0.0 {
+            (*point).approach = min((*point).approach, velocity);
+        }
     }
 }
 
-// The memory follows the mean impulse of the points, whose sum is `sum`.
-fn remember(
-    head: ConstraintHead,
-    sum: f32,
-    a: ptr<function, SolverBody>,
-    b: ptr<function, SolverBody>,
-    step: StepParams,
-) -> f32 {
-    let mean = sum / f32(head.count);
+// How fast memory follows, a sub-step.
+fn memory_rate(a: ptr<function, SolverBody>, b: ptr<function, SolverBody>, step: StepParams) -> f32 {
     let own = eigenvalues(a, b);
-    let rate = min(step.memory_gain * (own.x + own.y), step.memory_limit);
+    return min(step.memory_gain * (own.x + own.y), step.memory_limit);
+}
+
+// The memory of the mean follows that of the impulses.
+fn remember(remembered: f32, mean: f32, rate: f32) -> f32 {
     if mean > 0.0 {
-        return head.remembered + rate * (mean - head.remembered);
+        return remembered + rate * (mean - remembered);
     }
-    return FADE * head.remembered;
+    return FADE * remembered;
+}
+
+// A point's deviation from the mean follows that of its impulse; `remembered` is the new mean.
+fn deviate(deviation: f32, remembered: f32, normal: f32, mean: f32, rate: f32) -> f32 {
+    let own = max(remembered + deviation + DEVIATION * rate * rate * (normal - mean - deviation), 0.0);
+    if normal > 0.0 {
+        return own - remembered;
+    }
+    return FADE * min(own, remembered) - remembered;
 }
 
 // Counts `push` to what the sub-step began with.
 fn start_after(
-    point: ptr<function, ConstraintPoint>,
+    r: mat2x3<f32>,
     push: vec3<f32>,
     a: ptr<function, SolverBody>,
     b: ptr<function, SolverBody>,
 ) {
-    let ra = (*point).anchor_a;
-    let rb = (*point).anchor_b;
     (*a).linear_start = (*a).linear_start - (*a).inverse_mass * push;
-    (*a).angular_start = (*a).angular_start - inverse_inertia_times(a, cross(ra, push));
+    (*a).angular_start = (*a).angular_start - inverse_inertia_times(a, cross(r[0], push));
     (*b).linear_start = (*b).linear_start + (*b).inverse_mass * push;
-    (*b).angular_start = (*b).angular_start + inverse_inertia_times(b, cross(rb, push));
+    (*b).angular_start = (*b).angular_start + inverse_inertia_times(b, cross(r[1], push));
 }

@@ -58,19 +58,17 @@ fn visit(kind: u32, c: u32) {
         var point = points[p];
         var impulse = impulses[p];
         if kind == WARM_START {
-            warm_start_point(head.normal, t, &point, &impulse, &a, &b);
+            warm_start_point(head, t, &point, &impulse, &a, &b);
         } else if kind == RESTITUTION {
-            bounce(head.restitution, head.normal, &point, &impulse, &a, &b, step);
+            bounce(head, &point, &impulse, &a, &b, step);
             impulses[p].normal = impulse.normal;
+            points[p].total.x = point.total.x;
         } else {
-            // These two seldom change, and a write that is not made costs nothing.
-            let highest = point.max_impulse;
+            // It seldom changes, and a write that is not made costs nothing.
+            let lowest = point.approach;
             push_normal(kind, head, &point, &impulse, &a, &b, step);
             impulses[p].normal = impulse.normal;
-            if point.max_impulse > highest {
-                points[p].max_impulse = point.max_impulse;
-            }
-            if kind == RELAX && highest == 0.0 {
+            if point.approach < lowest {
                 points[p].approach = point.approach;
             }
         }
@@ -84,8 +82,11 @@ fn visit(kind: u32, c: u32) {
         loop {
             var point = points[p];
             var impulse = impulses[p];
-            push_tangent(head.friction, t, &point, &impulse, &a, &b);
+            push_tangent(head, t, &point, &impulse, &a, &b);
             impulses[p].tangent = impulse.tangent;
+            if kind == RELAX {
+                points[p].total = count(&point, &impulse);
+            }
             continuing {
                 p++;
                 break if p >= end;
@@ -115,7 +116,7 @@ fn load_constraint(c: u32) {
     loop {
         var point = points[p];
         var impulse = impulses[p];
-        warm_start_point(head.normal, t, &point, &impulse, &a, &b);
+        warm_start_point(head, t, &point, &impulse, &a, &b);
         weight += weight_of(&point, &impulse);
         continuing {
             p++;
@@ -153,14 +154,11 @@ fn pass_over(c: u32) {
         var point = points[p];
         var impulse = impulses[p];
         before[p - first] = vec3<f32>(impulse.normal, impulse.tangent[0], impulse.tangent[1]);
-        let highest = point.max_impulse;
+        let lowest = point.approach;
         pass_normal(head, &point, &impulse, &a, &b, step);
         sum += impulse.normal;
         impulses[p].normal = impulse.normal;
-        if point.max_impulse > highest {
-            points[p].max_impulse = point.max_impulse;
-        }
-        if highest == 0.0 {
+        if point.approach < lowest {
             points[p].approach = point.approach;
         }
         continuing {
@@ -168,19 +166,25 @@ fn pass_over(c: u32) {
             break if p >= end;
         }
     }
+    let mean = sum / f32(head.count);
+    let rate = memory_rate(&a, &b, step);
+    let remembered = remember(head.remembered, mean, rate);
+    heads[c].remembered = remembered;
     var blown = false;
     p = first;
     loop {
         var point = points[p];
         var impulse = impulses[p];
-        push_tangent(head.friction, t, &point, &impulse, &a, &b);
+        push_tangent(head, t, &point, &impulse, &a, &b);
+        points[p].total = count(&point, &impulse);
+        points[p].deviation = deviate(point.deviation, remembered, impulse.normal, mean, rate);
         let was = before[p - first];
         let blow = impulse.normal - was.x;
         if blow > step.blow_speed * point.normal_mass {
             // It is given once: the next sub-step starts without it.
             let x = impulse.tangent[0] - was.y;
             let y = impulse.tangent[1] - was.z;
-            start_after(&point, blow * head.normal + x * t[0] + y * t[1], &a, &b);
+            start_after(arms(head, &point), blow * head.normal + x * t[0] + y * t[1], &a, &b);
             impulse.tangent = array<f32, 2>(was.y, was.z);
             impulses[p].normal = was.x;
             blown = true;
@@ -191,7 +195,6 @@ fn pass_over(c: u32) {
             break if p >= end;
         }
     }
-    heads[c].remembered = remember(head, sum, &a, &b, step);
     if a.inverse_mass > 0.0 {
         solver_bodies[head.body_a].linear_velocity = a.linear_velocity;
         solver_bodies[head.body_a].angular_velocity = a.angular_velocity;

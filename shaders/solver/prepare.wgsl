@@ -159,11 +159,11 @@ fn constraints(
         points[4u * c + i] = ConstraintPoint(
             ra,
             point.separation - (dot(normal, rb - ra) - (round_b - round_a)),
-            rb,
             inverse(response(a, b, ra, rb, normal, normal)),
             inverse(stiffest),
             dot(normal, dv),
             0.0,
+            vec3<f32>(),
             0u,
         );
     }
@@ -196,6 +196,7 @@ fn constraints(
     }
     head.round_a = round_a;
     head.round_b = round_b;
+    head.between = between;
     heads[c] = head;
 }
 
@@ -229,6 +230,7 @@ fn carry(
             // The last that is the same, though no two should be.
             let k = select(select(select(0u, 1u, same.y), 2u, same.z), 3u, same.w);
             impulse = slot_impulses[first + k];
+            points[4u * c + i].deviation = slot_memory[next_pairs[index].slot].deviations[k];
         }
         impulses[4u * c + i] = impulse;
     }

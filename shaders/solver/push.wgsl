@@ -37,16 +37,23 @@ fn apply(
     (*b).angular_velocity = (*b).angular_velocity + inverse_inertia_times(b, cross(rb, push));
 }
 
+// From the bodies' centres of mass to a point, as columns.
+fn arms(head: ConstraintHead, point: ptr<function, ConstraintPoint>) -> mat2x3<f32> {
+    let ra = (*point).anchor;
+    return mat2x3<f32>(ra, ra - head.between);
+}
+
 fn warm_start_point(
-    normal: vec3<f32>,
+    head: ConstraintHead,
     t: mat2x3<f32>,
     point: ptr<function, ConstraintPoint>,
     impulse: ptr<function, Impulse>,
     a: ptr<function, SolverBody>,
     b: ptr<function, SolverBody>,
 ) {
-    let push = (*impulse).normal * normal + (*impulse).tangent[0] * t[0] + (*impulse).tangent[1] * t[1];
-    apply(a, b, (*point).anchor_a, (*point).anchor_b, push);
+    let push = (*impulse).normal * head.normal + (*impulse).tangent[0] * t[0] + (*impulse).tangent[1] * t[1];
+    let r = arms(head, point);
+    apply(a, b, r[0], r[1], push);
 }
 
 // Gap at a point now; the normal is held, the arms turn with the bodies but for their round parts.
@@ -56,8 +63,9 @@ fn separation_of(
     a: ptr<function, SolverBody>,
     b: ptr<function, SolverBody>,
 ) -> f32 {
-    let core_a = (*point).anchor_a - head.round_a * head.normal;
-    let core_b = (*point).anchor_b - head.round_b * head.normal;
+    let r = arms(head, point);
+    let core_a = r[0] - head.round_a * head.normal;
+    let core_b = r[1] - head.round_b * head.normal;
     let from_a = rotate((*a).delta, core_a);
     let from_b = rotate((*b).delta, core_b);
     let moved = (*b).translation - (*a).translation + from_b - from_a;
@@ -66,20 +74,19 @@ fn separation_of(
 
 // Friction against the sliding velocity, within the cone.
 fn push_tangent(
-    friction: f32,
+    head: ConstraintHead,
     t: mat2x3<f32>,
     point: ptr<function, ConstraintPoint>,
     impulse: ptr<function, Impulse>,
     a: ptr<function, SolverBody>,
     b: ptr<function, SolverBody>,
 ) {
-    let ra = (*point).anchor_a;
-    let rb = (*point).anchor_b;
-    let slide = relative_velocity(a, b, ra, rb);
+    let r = arms(head, point);
+    let slide = relative_velocity(a, b, r[0], r[1]);
     var x = (*impulse).tangent[0] - (*point).tangent_mass * dot(t[0], slide);
     var y = (*impulse).tangent[1] - (*point).tangent_mass * dot(t[1], slide);
     let size = sqrt(x * x + y * y);
-    let most = friction * (*impulse).normal;
+    let most = head.friction * (*impulse).normal;
     if size > most {
         let scale = most / size;
         x *= scale;
@@ -89,14 +96,18 @@ fn push_tangent(
     if is_finite3(push) {
         (*impulse).tangent[0] = x;
         (*impulse).tangent[1] = y;
-        apply(a, b, ra, rb, push);
+        apply(a, b, r[0], r[1], push);
     }
+}
+
+// All that a point pushed in the step so far, with this sub-step's impulse.
+fn count(point: ptr<function, ConstraintPoint>, impulse: ptr<function, Impulse>) -> vec3<f32> {
+    return (*point).total + vec3<f32>((*impulse).normal, (*impulse).tangent[0], (*impulse).tangent[1]);
 }
 
 // Gives back a share of the speed at which the points met, where they met fast enough and pushed at all.
 fn bounce(
-    restitution: f32,
-    normal: vec3<f32>,
+    head: ConstraintHead,
     point: ptr<function, ConstraintPoint>,
     impulse: ptr<function, Impulse>,
     a: ptr<function, SolverBody>,
@@ -104,18 +115,18 @@ fn bounce(
     step: StepParams,
 ) {
     let approach = (*point).approach;
-    if restitution == 0.0 || approach > -step.restitution_threshold || (*point).max_impulse == 0.0 {
+    if head.restitution == 0.0 || approach > -step.restitution_threshold || (*point).total.x == 0.0 {
         return;
     }
-    let ra = (*point).anchor_a;
-    let rb = (*point).anchor_b;
-    let velocity = dot(normal, relative_velocity(a, b, ra, rb));
-    let change = -(*point).normal_mass * (velocity + restitution * approach);
+    let r = arms(head, point);
+    let velocity = dot(head.normal, relative_velocity(a, b, r[0], r[1]));
+    let change = -(*point).normal_mass * (velocity + head.restitution * approach);
     let sum = (*impulse).normal + change;
     if is_finite_bits(sum) {
         let new_normal = max(sum, 0.0);
         let push = new_normal - (*impulse).normal;
         (*impulse).normal = new_normal;
-        apply(a, b, ra, rb, push * normal);
+        (*point).total.x += push;
+        apply(a, b, r[0], r[1], push * head.normal);
     }
 }

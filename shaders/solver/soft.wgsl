@@ -22,9 +22,8 @@ fn push_normal(
     step: StepParams,
 ) {
     let normal = head.normal;
-    let ra = (*point).anchor_a;
-    let rb = (*point).anchor_b;
-    let velocity = dot(normal, relative_velocity(a, b, ra, rb));
+    let r = arms(head, point);
+    let velocity = dot(normal, relative_velocity(a, b, r[0], r[1]));
     let separation = separation_of(head, point, a, b);
     var bias = 0.0;
     var mass_scale = 1.0;
@@ -36,7 +35,7 @@ fn push_normal(
         mass_scale = head.mass_scale;
         impulse_scale = head.impulse_scale;
     }
-    if kind == RELAX && (*point).max_impulse == 0.0 {
+    if kind == RELAX && (*point).total.x == 0.0 && (*impulse).normal == 0.0 {
         (*point).approach = min((*point).approach, velocity);
     }
     let change = -(*point).normal_mass * mass_scale * (velocity + bias) - impulse_scale * (*impulse).normal;
@@ -46,7 +45,6 @@ fn push_normal(
         let new_normal = max(sum, 0.0);
         let push = new_normal - (*impulse).normal;
         (*impulse).normal = new_normal;
-        (*point).max_impulse = max((*point).max_impulse, new_normal);
-        apply(a, b, ra, rb, push * normal);
+        apply(a, b, r[0], r[1], push * normal);
     }
 }

@@ -1,6 +1,6 @@
 // Impulses go back to the slots that outlive the step. Twin of crates/cpu/src/solver/store.rs.
 //
-// One thread a constraint: reads `heads` and `impulses`, writes all four of its slot in `slot_impulses`; places beyond
+// One thread a constraint: reads `heads`, `points` and `impulses`, writes all four of its slot in `slot_impulses`; places beyond
 // the points in use are given the feature of no point. What the manifold remembers goes to `slot_memory`.
 
 //#import shared/constraint.wgsl
@@ -13,6 +13,7 @@ const NO_FEATURE: u32 = 0xffffffffu;
 @group(0) @binding(1) var<storage, read> heads: array<ConstraintHead>;
 @group(0) @binding(2) var<storage, read> impulses: array<Impulse>;
 @group(0) @binding(3) var<storage, read_write> slot_impulses: array<Impulse>;
+@group(0) @binding(5) var<storage, read> points: array<ConstraintPoint>;
 @group(0) @binding(4) var<storage, read_write> slot_memory: array<ManifoldMemory>;
 
 @compute @workgroup_size(256)
@@ -27,7 +28,14 @@ fn store(
     }
     let slot = heads[c].slot;
     let count = heads[c].count;
-    slot_memory[slot] = ManifoldMemory(heads[c].remembered * f32(count), 0u, 0u, 0u);
+    var memory: ManifoldMemory;
+    memory.remembered = heads[c].remembered * f32(count);
+    for (var i = 0u; i < min(count, 4u); i++) {
+        let total = points[4u * c + i].total;
+        memory.deviations[i] = points[4u * c + i].deviation;
+        memory.totals[i] = array<f32, 3>(total.x, total.y, total.z);
+    }
+    slot_memory[slot] = memory;
     for (var i = 0u; i < 4u; i++) {
         var impulse: Impulse;
         impulse.feature = NO_FEATURE;

@@ -173,9 +173,7 @@ impl Cpu {
         for (c, &index) in frame.batches.order.iter().enumerate() {
             let slot = frame.matched.pairs[index as usize].slot as usize;
             for point in 0..4 {
-                let impulse = &rows.impulses[4 * c + point];
-                impulses[4 * slot + point] =
-                    store::store(&frame.manifolds[index as usize], point, impulse.normal, impulse.tangent);
+                impulses[4 * slot + point] = store::store(&frame.manifolds[index as usize], point, &rows.solved(c));
             }
         }
         impulses
@@ -184,9 +182,9 @@ impl Cpu {
     /// The same of what slots remember of manifolds.
     pub(crate) fn remembered(&self, frame: &Frame, rows: &PlainRows) -> Vec<ManifoldMemory> {
         let mut memory = self.memory.clone();
-        for (head, &index) in rows.heads.iter().zip(&frame.batches.order) {
+        for (c, &index) in frame.batches.order.iter().enumerate() {
             let slot = frame.matched.pairs[index as usize].slot as usize;
-            memory[slot] = store::store_memory(&frame.manifolds[index as usize], head.remembered);
+            memory[slot] = store::store_memory(&frame.manifolds[index as usize], &rows.solved(c));
         }
         memory
     }
@@ -218,7 +216,8 @@ impl Cpu {
 
 /// A control block with what the passes after the narrow phase read.
 pub(crate) fn control_of(frame: &Frame, recolor: bool) -> Control {
-    let mut control = Control { recolor: recolor.into(), ..Control::zeroed() };
+    let colored_as = if recolor { 0 } else { frame.step.batching };
+    let mut control = Control { colored_as, ..Control::zeroed() };
     control.pair_count = frame.matched.pairs.len() as u32;
     control.new_count = frame.matched.new_count;
     control.dead_count = frame.matched.dead_slots.len() as u32;

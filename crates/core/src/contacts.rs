@@ -3,7 +3,7 @@
 use crate::edit::Editor;
 use crate::handle::{BodyHandle, ColliderHandle};
 use crate::layout::{
-    BodyState, Collider, FoundManifold, Impulse, Manifold, ManifoldPoint, Pair, StepParams, shape_kind, tangents,
+    BodyState, Collider, FoundManifold, Manifold, ManifoldMemory, ManifoldPoint, Pair, StepParams, shape_kind, tangents,
 };
 use glam::{Quat, Vec3};
 
@@ -35,7 +35,8 @@ pub struct Contact {
     pub body_b: BodyHandle,
     /// From the first to the second, unit, world axes: along it the step pushed.
     pub normal: Vec3,
-    /// The batch that it was solved in; [`LAST_BATCH`](crate::layout::LAST_BATCH) is the one that is solved in sequence.
+    /// The batch that it was solved in. Batches are solved in the order of their numbers, some of which may be in no
+    /// use; [`LAST_BATCH`](crate::layout::LAST_BATCH) is the one that is solved in sequence.
     pub batch: u32,
     points: [ContactPoint; 4],
     count: u32,
@@ -50,11 +51,8 @@ pub struct ContactPoint {
     pub separation: f32,
     /// What the second body was pushed along the normal, and the first against it; N s, never negative.
     ///
-    /// It is the impulse of the last sub-step times the number of sub-steps. Divided by [`Contacts::dt`] it is the force
-    /// at the end of the step, in N: under a ball at rest m g. With one sub-step a step it is all that was pushed. With
-    /// more it is that only where the push is steady: a blow counts as often as there are sub-steps if it falls in the
-    /// last, and not at all before; and a ball that rolls fast is carried by the first sub-steps of a step, so that the
-    /// last reads less than its weight, down to nothing (at 4 sub-steps of 1/60 s and 5 m/s on a radius of 0.5 m).
+    /// All that was pushed in the step: the sum over its sub-steps, bounces included. Divided by [`Contacts::dt`] it is the
+    /// mean force, in N: under a ball at rest m g.
     pub normal_impulse: f32,
     /// What friction pushed the second body, and the first the other way; world axes, N s, taken as the above.
     pub friction_impulse: Vec3,
@@ -88,8 +86,8 @@ pub struct Committed<'a> {
     pub batch_of_slot: &'a [u32],
     /// By slot of a pair.
     pub found: &'a [FoundManifold],
-    /// Four a slot of a pair.
-    pub impulses: &'a [Impulse],
+    /// By slot of a pair.
+    pub memory: &'a [ManifoldMemory],
 }
 
 impl Committed<'_> {
@@ -104,7 +102,7 @@ impl Committed<'_> {
         let (collider_a, body_a) = editor.collider_at(pair.a)?;
         let (collider_b, body_b) = editor.collider_at(pair.b)?;
         let slot = pair.slot as usize;
-        let (found, impulses) = (&self.found[slot], &self.impulses[4 * slot..4 * slot + 4]);
+        let (found, totals) = (&self.found[slot], &self.memory[slot].totals);
         let end = |collider: u32, body: BodyHandle, rotation: [f32; 4]| End {
             collider: &self.colliders[collider as usize],
             state: &self.states[body.slot()],
@@ -117,9 +115,9 @@ impl Committed<'_> {
         for (i, point) in points.iter_mut().enumerate().take(count as usize) {
             *point = placed(&found.manifold, &found.manifold.points[i], &a, &b);
             let (t1, t2) = tangents(normal);
-            let substeps = self.step.substeps as f32;
-            point.normal_impulse = substeps * impulses[i].normal;
-            point.friction_impulse = substeps * (impulses[i].tangent[0] * t1 + impulses[i].tangent[1] * t2);
+            let [pushed, x, y] = totals[i];
+            point.normal_impulse = pushed;
+            point.friction_impulse = x * t1 + y * t2;
         }
         let batch = self.batch_of_slot[slot];
         Some(Contact { collider_a, collider_b, body_a, body_b, normal, batch, points, count })

@@ -1,7 +1,7 @@
 //! Bounds that both sides share: of loops, which some drivers cut short in silence, and of buffers.
 
 use crate::error::{Error, Result};
-use crate::layout::{BodyState, Collider, EditRecord};
+use crate::layout::{BodyState, Collider, EditRecord, batching};
 use crate::params::Capacities;
 
 /// Rounds of placing before the rest goes to the last batch; each round places at least one constraint, and in
@@ -115,9 +115,25 @@ pub fn grown(needed: u64) -> u64 {
 /// Rounds of placing that run over all new constraints at once; later ones run in one workgroup over what is left.
 pub const WIDE_ROUNDS: u32 = 8;
 
+/// Rounds in which write-and-verify fills one batch.
+pub const TRIES: u32 = 3;
+
+/// Rounds of write-and-verify that run over all constraints at once, 20 batches. One workgroup adds as many.
+pub const VERIFY_ROUNDS: u32 = 60;
+
+/// Rounds over all constraints at once, as [`StepParams::batching`](crate::layout::StepParams::batching) asks.
+pub fn wide_rounds(batching: u32) -> u32 {
+    if batching & batching::LAW == batching::WRITE_AND_VERIFY { VERIFY_ROUNDS } else { WIDE_ROUNDS }
+}
+
+/// Most rounds in all.
+pub fn batch_rounds(batching: u32) -> u32 {
+    if batching & batching::LAW == batching::WRITE_AND_VERIFY { 2 * VERIFY_ROUNDS } else { BATCH_ROUNDS }
+}
+
 /// How many rounds that one workgroup may add for `left` constraints within its loops' bound.
-pub fn tail_rounds(left: u32) -> u32 {
-    (BATCH_ROUNDS - WIDE_ROUNDS).min(24_000 / left.div_ceil(256).max(1))
+pub fn tail_rounds(batching: u32, left: u32) -> u32 {
+    (batch_rounds(batching) - wide_rounds(batching)).min(24_000 / left.div_ceil(256).max(1))
 }
 
 /// Bytes of the widest array that follows the number of pairs.

@@ -1,8 +1,8 @@
 //! What the user may set, with units and defaults.
 
 use crate::error::{Result, check};
-use crate::layout::StepParams;
-use crate::limits::{BATCH_ROUNDS, BYTES_A_PAIR, LAST_LIMIT};
+use crate::layout::{StepParams, batching};
+use crate::limits::{BYTES_A_PAIR, LAST_LIMIT, batch_rounds};
 use crate::solver::{Law, Solver, Spring};
 use glam::Vec3;
 use std::fmt;
@@ -67,6 +67,32 @@ pub enum MortonBits {
     Bits30,
     /// 21 bits an axis, for domains so wide that bodies would share such cells.
     Bits63,
+}
+
+/// How constraints are put into batches: groups within which no two share a moving body, so that each can be solved in
+/// parallel. All need no more than the constraints themselves, so that results do not depend on timing; they differ in
+/// the order in which constraints are solved, and so in results.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
+pub enum Batching {
+    /// One batch after the other, each step anew: every constraint that is in none yet bids for both its bodies, and
+    /// joins the batch if it holds both; a few tries a batch (Harada, GDC 2009).
+    WriteAndVerify,
+    /// Each step anew, but who holds both bodies takes the lowest batch that neither is in: fewer rounds.
+    LowestFree,
+    /// The same, and who is in a batch stays there as long as the surfaces touch, so that only what is new is placed.
+    #[default]
+    Persistent,
+}
+
+impl fmt::Display for Batching {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::WriteAndVerify => "write and verify",
+            Self::LowestFree => "lowest free",
+            Self::Persistent => "persistent",
+        })
+    }
 }
 
 /// Room in buffers at first, and whether there may be more.
@@ -153,6 +179,11 @@ pub struct Params {
     pub traversal: Traversal,
     /// Precision of the trees' codes.
     pub morton_bits: MortonBits,
+    /// How constraints are put into batches.
+    pub batching: Batching,
+    /// Whether contacts with what does not move are solved after all others, the last batch (hubs) excepted. Off at
+    /// first.
+    pub static_contacts_last: bool,
     /// Room in buffers.
     pub capacities: Capacities,
     /// Worker threads of the CPU side; `None`: one a core. The result is the same for any number.
@@ -174,6 +205,8 @@ impl Default for Params {
             broadphase: Broadphase::Auto,
             traversal: Traversal::default(),
             morton_bits: MortonBits::default(),
+            batching: Batching::default(),
+            static_contacts_last: false,
             capacities: Capacities::default(),
             threads: None,
             profile: false,
@@ -249,12 +282,23 @@ impl Params {
             speculative_distance: self.speculative_distance,
             restitution_threshold: self.restitution_threshold,
             drop_pair: u32::MAX,
-            batch_rounds: BATCH_ROUNDS,
+            batch_rounds: batch_rounds(self.batching_word()),
             last_limit: LAST_LIMIT,
             write_poses: 1,
             sleep_distance: self.sleep.map_or(-1.0, |sleep| sleep.distance),
             sleep_time: self.sleep.map_or(f32::MAX, |sleep| sleep.time),
+            batching: self.batching_word(),
             ..bytemuck::Zeroable::zeroed()
         }
+    }
+
+    /// [`StepParams::batching`].
+    fn batching_word(&self) -> u32 {
+        let law = match self.batching {
+            Batching::WriteAndVerify => batching::WRITE_AND_VERIFY,
+            Batching::LowestFree => batching::LOWEST_FREE,
+            Batching::Persistent => batching::PERSISTENT,
+        };
+        law | if self.static_contacts_last { batching::STATIC_LAST } else { 0 }
     }
 }

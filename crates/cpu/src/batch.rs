@@ -3,14 +3,18 @@
 //!
 //! Harada, "Parallelizing the Physics Pipeline" (GDC 2009): each constraint without a batch writes itself to its
 //! bodies; one that reads itself on both keeps the batch. There the last writer wins; here the lowest hashed index
-//! does (an atomic minimum), so that the result depends on the constraints alone and every round places at least one. A
-//! winner takes the lowest batch that neither body is in. Constraints keep their batch while they touch; fixed,
-//! kinematic and frozen bodies never conflict. What the rounds leave goes to the last batch, solved in sequence.
+//! does (an atomic minimum), so that the result depends on the constraints alone. By write-and-verify, the talk's own
+//! law, a winner joins the batch that is being filled, a few rounds a batch; else it takes the lowest batch that
+//! neither body is in, and every round places at least one. Persistent constraints keep their batch while they touch;
+//! fixed, kinematic and frozen bodies never conflict. What the rounds leave goes to the last batch, solved in sequence.
+//!
+//! Contacts with what does not move can be had last: they then take the highest free batch instead of the lowest. So
+//! neither side has to know how many batches the other takes, and batches that nobody is in are left out of the order.
 
-use tumble_core::layout::{BATCHES, BodyState, LAST_BATCH, Manifold, Pair, StepParams, UNBATCHED};
+use tumble_core::layout::{BATCHES, BodyState, LAST_BATCH, Manifold, Pair, StepParams, UNBATCHED, batching};
 
 use crate::bounds::moves;
-use tumble_core::limits::{WIDE_ROUNDS, tail_rounds};
+use tumble_core::limits::{TRIES, VERIFY_ROUNDS, tail_rounds, wide_rounds};
 
 /// What one constraint needs to be placed. `NO_BODY` where nothing moves.
 #[derive(Debug, Clone, Copy)]
@@ -27,17 +31,18 @@ pub const NO_BODY: u32 = u32::MAX;
 /// How this step's constraints are batched.
 #[derive(Debug, Default)]
 pub struct Batches {
-    /// Batch of each pair; [`UNBATCHED`] when it does not touch.
+    /// Batch of each pair, some of 64 numbers; [`UNBATCHED`] when it does not touch.
     pub of_pair: Vec<u32>,
     /// Pair of each constraint, batch by batch, in pair order within one.
     pub order: Vec<u32>,
-    /// First constraint of each batch, and the end.
+    /// First constraint of each batch, and the end. Here batches that nobody is in come behind the others, but before
+    /// the last one.
     pub start: Vec<u32>,
     /// Batches that each body is in.
     pub masks: Vec<u64>,
     /// Rounds that placing took.
     pub rounds: u32,
-    /// One more than the highest batch in use, the last one excluded.
+    /// Batches in use, the last one excluded.
     pub batch_count: u32,
     /// Most constraints on one body.
     pub max_degree: u32,
@@ -52,7 +57,7 @@ pub fn hash26(x: u32) -> u32 {
     h ^ h >> 13
 }
 
-/// Claim of a constraint in a round: later rounds undercut earlier ones, so that claims need no clearing.
+/// Claim of a constraint in a round below 63: later rounds undercut earlier ones, so that claims need no clearing.
 pub fn claim(pair: u32, round: u32) -> u32 {
     (63 - round) << 26 | hash26(pair)
 }
@@ -93,18 +98,22 @@ pub fn place(
         }
     }
     let mut claims = vec![u32::MAX; body_count];
-    let mut rounds = 0;
+    let (mut rounds, wide) = (0, wide_rounds(step.batching));
     let mut allowed = step.batch_rounds;
     while !unplaced.is_empty() && rounds < allowed {
-        if rounds == WIDE_ROUNDS {
-            allowed = WIDE_ROUNDS + tail_rounds(unplaced.len() as u32);
+        if rounds == wide {
+            allowed = wide + tail_rounds(step.batching, unplaced.len() as u32);
+        }
+        let turn = claim_round(step.batching, rounds);
+        if turn == 0 && rounds > 0 {
+            claims.fill(u32::MAX);
         }
         for &i in &unplaced {
-            // Masks only fill: one that finds none free never will, and must not stand in its neighbours' way.
-            if lowest_free(&masks, ends[i as usize]) < LAST_BATCH {
-                bid(&mut claims, ends[i as usize], claim(i, rounds));
-            } else {
-                of_pair[i as usize] = LAST_BATCH;
+            match wanted(&masks, ends[i as usize], rounds, step.batching) {
+                // Masks only fill: one that finds none free never will, and must not stand in its neighbours' way.
+                LAST_BATCH => of_pair[i as usize] = LAST_BATCH,
+                UNBATCHED => {}
+                _ => bid(&mut claims, ends[i as usize], claim(i, turn)),
             }
         }
         unplaced.retain(|&i| {
@@ -112,9 +121,9 @@ pub fn place(
                 join(&mut masks, ends[i as usize], LAST_BATCH);
                 return false;
             }
-            let won = holds(&claims, ends[i as usize], claim(i, rounds));
+            let won = holds(&claims, ends[i as usize], claim(i, turn));
             if won {
-                let batch = lowest_free(&masks, ends[i as usize]);
+                let batch = wanted(&masks, ends[i as usize], rounds, step.batching);
                 of_pair[i as usize] = batch;
                 join(&mut masks, ends[i as usize], batch);
             }
@@ -126,18 +135,28 @@ pub fn place(
         of_pair[i as usize] = LAST_BATCH;
         join(&mut masks, ends[i as usize], LAST_BATCH);
     }
-    let (order, start) = sort_by_batch(&of_pair);
-    let used = masks.iter().fold(0, |all, m| all | m) & !(1 << LAST_BATCH);
-    let batch_count = (0..LAST_BATCH as usize).rev().find(|&b| start[b + 1] > start[b]).map_or(0, |b| b as u32 + 1);
-    debug_assert!(used >> batch_count == 0);
+    let (order, start, batch_count) = sort_by_batch(&of_pair);
     let max_degree = masks.iter().map(|m| m.count_ones()).max().unwrap_or(0);
     Batches { of_pair, order, start, masks, rounds, batch_count, max_degree }
 }
 
+/// What these batches are good for, see [`Control::colored_as`](tumble_core::layout::Control::colored_as).
+pub fn colored_as(batches: &Batches, batching: u32) -> u32 {
+    let persistent = batching & batching::LAW == batching::PERSISTENT;
+    if persistent && !wasteful(batches, batching) { batching } else { 0 }
+}
+
 /// Whether bodies lost so many constraints that batches stand half empty: the next step colours anew. Colouring
-/// anew gives fewer than twice the highest degree, so this never repeats for nothing.
-pub fn wasteful(batch_count: u32, max_degree: u32) -> bool {
-    batch_count > 2 * max_degree
+/// anew gives fewer than twice the highest degree, and no more than that degree for the contacts that come last, so
+/// this never repeats for nothing.
+pub fn wasteful(batches: &Batches, batching: u32) -> bool {
+    let share = if batching & batching::STATIC_LAST == 0 { 2 } else { 3 };
+    batches.batch_count > share * batches.max_degree
+}
+
+/// Number of the round among those that share claims.
+fn claim_round(batching: u32, round: u32) -> u32 {
+    if batching & batching::LAW == batching::WRITE_AND_VERIFY { round % VERIFY_ROUNDS } else { round }
 }
 
 fn join(masks: &mut [u64], ends: Ends, batch: u32) {
@@ -160,14 +179,27 @@ fn holds(claims: &[u32], ends: Ends, claim: u32) -> bool {
     [ends.a, ends.b].iter().all(|&body| body == NO_BODY || claims[body as usize] == claim)
 }
 
-fn lowest_free(masks: &[u64], ends: Ends) -> u32 {
+/// The batch that a constraint may join in this round: [`UNBATCHED`] when there is none in this one, [`LAST_BATCH`]
+/// when there will be none.
+fn wanted(masks: &[u64], ends: Ends, round: u32, batching: u32) -> u32 {
     let taken =
         [ends.a, ends.b].iter().filter(|&&body| body != NO_BODY).fold(0, |all, &body| all | masks[body as usize]);
-    (!taken).trailing_zeros()
+    let from_above = batching & batching::STATIC_LAST != 0 && (ends.a == NO_BODY || ends.b == NO_BODY);
+    if batching & batching::LAW == batching::WRITE_AND_VERIFY {
+        let filling = round / TRIES;
+        let batch = if from_above { LAST_BATCH - 1 - filling } else { filling };
+        return if taken >> batch & 1 == 0 { batch } else { UNBATCHED };
+    }
+    let free = !taken & !(1 << LAST_BATCH);
+    match (free, from_above) {
+        (0, _) => LAST_BATCH,
+        (_, true) => free.ilog2(),
+        (_, false) => free.trailing_zeros(),
+    }
 }
 
-/// Stable counting sort of the touching pairs by batch.
-fn sort_by_batch(of_pair: &[u32]) -> (Vec<u32>, Vec<u32>) {
+/// Stable counting sort of the touching pairs by batch: their order, the starts of batches, how many are in use.
+fn sort_by_batch(of_pair: &[u32]) -> (Vec<u32>, Vec<u32>, u32) {
     let mut start = vec![0u32; BATCHES as usize + 1];
     for &batch in of_pair.iter().filter(|&&b| b != UNBATCHED) {
         start[batch as usize] += 1;
@@ -179,5 +211,15 @@ fn sort_by_batch(of_pair: &[u32]) -> (Vec<u32>, Vec<u32>) {
         order[cursor[batch as usize] as usize] = i as u32;
         cursor[batch as usize] += 1;
     }
-    (order, start)
+    // Those that nobody is in go to the end.
+    let mut used = 0;
+    for batch in 0..LAST_BATCH as usize {
+        if start[batch] < start[batch + 1] {
+            start[used] = start[batch];
+            used += 1;
+        }
+    }
+    let last_start = start[LAST_BATCH as usize];
+    start[used..LAST_BATCH as usize].fill(last_start);
+    (order, start, used as u32)
 }

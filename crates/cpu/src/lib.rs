@@ -17,6 +17,7 @@ pub mod query;
 mod shared;
 pub mod sleep;
 pub mod solver;
+mod workers;
 mod world;
 
 pub use world::World;

@@ -1,6 +1,8 @@
 //! A slice that the threads of one parallel pass write at places that the pass itself keeps apart.
 
+use bytemuck::Pod;
 use std::marker::PhantomData;
+use std::ops::Range;
 
 /// A mutable slice shared by threads that promise to touch different elements.
 pub(crate) struct Shared<'a, T> {
@@ -12,6 +14,27 @@ pub(crate) struct Shared<'a, T> {
 // SAFETY: the wrapper only hands out access through `get` and `set`, whose callers promise that no element is
 // written by one thread while another touches it; `T: Copy + Send` holds no thread-bound state.
 unsafe impl<T: Copy + Send> Sync for Shared<'_, T> {}
+
+impl<T: Copy> Shared<'_, T> {
+    /// Elements `range`, for this thread alone.
+    ///
+    /// # Safety
+    /// No other thread touches any of them while the slice lives, nor does this one by another way.
+    #[expect(clippy::mut_from_ref, reason = "callers keep the ranges apart")]
+    pub(crate) unsafe fn slice_mut(&self, range: Range<usize>) -> &mut [T] {
+        assert!(range.start <= range.end && range.end <= self.len);
+        // SAFETY: in bounds by the assertion; nobody else touches it meanwhile, by the caller's promise.
+        unsafe { std::slice::from_raw_parts_mut(self.start.add(range.start), range.len()) }
+    }
+}
+
+impl<'a, T: Pod> Shared<'a, T> {
+    /// The same memory as elements of another type, of which one element of this has a whole number.
+    pub(crate) fn rows<R: Pod>(&self) -> Shared<'a, R> {
+        const { assert!(size_of::<T>().is_multiple_of(size_of::<R>()) && align_of::<T>() >= align_of::<R>()) };
+        Shared { start: self.start.cast(), len: self.len * (size_of::<T>() / size_of::<R>()), lifetime: PhantomData }
+    }
+}
 
 impl<'a, T: Copy> Shared<'a, T> {
     pub(crate) fn new(slice: &'a mut [T]) -> Self {

@@ -1,7 +1,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// What the points of one constraint share. 64 bytes. Constraints lie in batch order.
+/// What the points of one constraint share. 80 bytes. Constraints lie in batch order.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct ConstraintHead {
@@ -25,36 +25,42 @@ pub struct ConstraintHead {
     pub mass_scale: f32,
     /// Spring: share of the impulse that leaks.
     pub impulse_scale: f32,
-    /// One pass: what a point bears in the long run, mean over the points, N s. Follows their impulses.
+    /// One pass: what the points bear in the long run, on the mean, N s. Follows their impulses.
     pub remembered: f32,
-    /// Part of `anchor_a` along the normal that does not turn with the body, because the body is a ball there, m.
+    /// Part of the first body's arm along the normal that does not turn with it, because it is a ball there, m.
     pub round_a: f32,
-    /// The same of `anchor_b`.
+    /// The same of the second body's.
     pub round_b: f32,
     /// Unused.
     pub pad_a: u32,
+    /// From the centre of mass of a to that of b when the points were found, world axes, m.
+    pub between: [f32; 3],
+    /// Unused.
+    pub pad_b: u32,
 }
 
 /// One contact point as the solver sees it. 48 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct ConstraintPoint {
-    /// From the centre of mass of a, world axes at the start of the step, m.
-    pub anchor_a: [f32; 3],
-    /// Separation less the normal part of `anchor_b - anchor_a` that turns with the bodies, so that the current one is this plus the moved anchors' share, m.
+    /// From the centre of mass of a, world axes at the start of the step, m. Less [`ConstraintHead::between`], that is
+    /// from the centre of mass of b.
+    pub anchor: [f32; 3],
+    /// Separation less the normal part of the arms' difference that turns with the bodies, so that the current one is this
+    /// plus the moved arms' share, m.
     pub adjusted_separation: f32,
-    /// From the centre of mass of b, m.
-    pub anchor_b: [f32; 3],
     /// Mass seen along the normal, kg.
     pub normal_mass: f32,
     /// Mass seen by friction in its stiffest direction, kg.
     pub tangent_mass: f32,
-    /// Normal velocity before the first push of the step, m/s.
+    /// Lowest normal velocity before the first push of the step, m/s.
     pub approach: f32,
-    /// Largest normal impulse of any visit in the step, N s.
-    pub max_impulse: f32,
+    /// One pass: what this point bears in the long run more than the mean, N s.
+    pub deviation: f32,
+    /// All that was pushed in the step, along the normal and the two tangents, N s.
+    pub total: [f32; 3],
     /// Unused.
-    pub pad_a: u32,
+    pub pad_b: u32,
 }
 
 /// Accumulated impulse of one point; lasts from step to step. 16 bytes.
@@ -69,7 +75,7 @@ pub struct Impulse {
     pub feature: u32,
 }
 
-/// What a slot remembers of its manifold as a whole. 16 bytes.
+/// What a slot remembers of its manifold beside the impulses that carry over. 80 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 pub struct ManifoldMemory {
@@ -81,6 +87,10 @@ pub struct ManifoldMemory {
     pub pad_b: u32,
     /// Unused.
     pub pad_c: u32,
+    /// [`ConstraintPoint::deviation`] of the points.
+    pub deviations: [f32; 4],
+    /// [`ConstraintPoint::total`] of the points in the last step.
+    pub totals: [[f32; 3]; 4],
 }
 
 /// Two unit vectors that make a frame with `n`. They jump where |n.x| passes 0.577, far from the axes along which

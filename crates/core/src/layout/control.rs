@@ -44,8 +44,9 @@ pub struct Control {
     pub old_pair_count: u32,
     /// Slots on the free list.
     pub free_count: u32,
-    /// 1 when the next step colours everything anew.
-    pub recolor: u32,
+    /// What the kept batches are good for: `StepParams::batching` of the steps that may keep them. A step with another
+    /// one colours everything anew, and so does every step after 0.
+    pub colored_as: u32,
     /// Bodies in quarantine, all told.
     pub frozen_count: u32,
 
@@ -61,7 +62,7 @@ pub struct Control {
     pub constraint_count: u32,
     /// Contact points.
     pub point_count: u32,
-    /// Batches in use: one more than the highest, the last one excluded.
+    /// Batches in use, the last one excluded.
     pub batch_count: u32,
     /// Rounds that placing took.
     pub rounds: u32,
@@ -92,7 +93,8 @@ pub struct Control {
     /// Unused.
     pub pad_a: u32,
 
-    /// First constraint of each batch; the one after the last is the number of all.
+    /// First constraint of each batch in use, in their order, then those in no use, then the last one; behind it the
+    /// number of all.
     pub batch_start: [u32; 68],
     /// Slots of bodies newly quarantined in this step, plus one; zero where there is none.
     pub quarantined: [u32; QUARANTINE_NAMES],

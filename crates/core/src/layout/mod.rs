@@ -20,5 +20,5 @@ pub use control::{BATCHES, Control, LAST_BATCH, QUARANTINE_NAMES, UNBATCHED, ove
 pub use edit::{EditRange, EditRecord, edit_op};
 pub use manifold::{FoundManifold, Manifold, ManifoldPoint, NO_SLOT, Pair, pair_kind};
 pub use query::{NO_COLLIDER, PlacedShape, QueryAnswer, QueryInfo, QueryPoint, QueryRay, QueryVolume, query_word};
-pub use step::{StepParams, solver};
+pub use step::{StepParams, batching, solver};
 pub use tree::{NO_NODE, TreeInfo, TreeNode, root_of, tree_members};

@@ -8,7 +8,7 @@ pub mod solver {
     pub const SOFT: u32 = 1;
 }
 
-/// What one step is told, as a uniform. 144 bytes.
+/// What one step is told, as a uniform. 160 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct StepParams {
@@ -74,10 +74,32 @@ pub struct StepParams {
     pub blow_speed: f32,
     /// Which of the laws in [`solver`].
     pub solver: u32,
+    /// How constraints are put into batches, see [`batching`].
+    pub batching: u32,
     /// How far a point of a body's surface may stray while the body is at rest, m; below 0 where nothing sleeps.
     pub sleep_distance: f32,
     /// How long all bodies of an island must have been at rest before it sleeps, s.
     pub sleep_time: f32,
     /// 1 when all who sleep wake.
     pub wake_all: u32,
+    /// Unused.
+    pub pad_a: u32,
+    /// Unused.
+    pub pad_b: u32,
+    /// Unused.
+    pub pad_c: u32,
+}
+
+/// Words of [`StepParams::batching`]: a law, and flags.
+pub mod batching {
+    /// Batch after batch, anew each step.
+    pub const WRITE_AND_VERIFY: u32 = 1;
+    /// The lowest batch that both bodies are free in, anew each step.
+    pub const LOWEST_FREE: u32 = 2;
+    /// The same, kept from step to step.
+    pub const PERSISTENT: u32 = 3;
+    /// Bits of the law.
+    pub const LAW: u32 = 3;
+    /// Flag: contacts with what does not move take the highest free batch, not the lowest.
+    pub const STATIC_LAST: u32 = 4;
 }

@@ -53,7 +53,7 @@ pub(crate) fn collect(
     most: u32,
     search: impl Fn(Range<usize>, &mut Sink) + Sync,
 ) -> Found {
-    const CHUNK: usize = 512;
+    const CHUNK: usize = 128;
     let total = AtomicU64::new(0);
     let sink = || Sink { pairs: Vec::new(), count: 0, room: most as usize, most_turns: 0, turns: 0 };
     let chunk = |chunk: usize| {

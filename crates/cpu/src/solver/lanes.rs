@@ -1,31 +1,40 @@
-//! Four constraints side by side, for the fast form of the visits (`soft_lanes`). The plain form is `soft`.
+//! Constraints side by side, for the fast form of the visits (files called `_lanes`).
+//!
+//! Groups are as wide as what the program was built for computes at once: eight with AVX (`-C target-cpu=native`, or
+//! `x86-64-v3`), else four. Lanes know nothing of each other, so the results are the same.
 
 use super::push_lanes;
+use super::store::Solved;
 use crate::shared::Shared;
 use std::ops::{Add, Mul, Sub};
 use tumble_core::layout::{ConstraintHead, Impulse, ManifoldPoint, SolverBody, StepParams};
 use wide::f32x4;
 
-/// Constraints side by side.
-pub(crate) const LANES: usize = 4;
+#[cfg(not(target_feature = "avx"))]
+pub(crate) use wide::f32x4 as Lane;
+#[cfg(target_feature = "avx")]
+pub(crate) use wide::f32x8 as Lane;
 
-/// In place of a body where a group has fewer than four constraints.
+/// Constraints side by side.
+pub(crate) const LANES: usize = size_of::<Lane>() / size_of::<f32>();
+
+/// In place of a body where a group has fewer constraints.
 pub(crate) const NO_BODY: u32 = u32::MAX;
 
-/// Four vectors.
+/// A vector of each.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct V3 {
-    pub(crate) x: f32x4,
-    pub(crate) y: f32x4,
-    pub(crate) z: f32x4,
+    pub(crate) x: Lane,
+    pub(crate) y: Lane,
+    pub(crate) z: Lane,
 }
 
 impl V3 {
-    pub(crate) fn new(x: f32x4, y: f32x4, z: f32x4) -> Self {
+    pub(crate) fn new(x: Lane, y: Lane, z: Lane) -> Self {
         Self { x, y, z }
     }
     #[inline(always)]
-    pub(crate) fn dot(self, o: Self) -> f32x4 {
+    pub(crate) fn dot(self, o: Self) -> Lane {
         self.x * o.x + self.y * o.y + self.z * o.z
     }
     #[inline(always)]
@@ -55,7 +64,7 @@ impl Sub for V3 {
     }
 }
 
-impl Mul<V3> for f32x4 {
+impl Mul<V3> for Lane {
     type Output = V3;
     #[inline(always)]
     fn mul(self, v: V3) -> V3 {
@@ -63,46 +72,46 @@ impl Mul<V3> for f32x4 {
     }
 }
 
-fn set(lanes: &mut f32x4, lane: usize, value: f32) {
+fn set(lanes: &mut Lane, lane: usize, value: f32) {
     lanes.as_mut_array()[lane] = value;
 }
 
-/// One point of each of four constraints, with its impulse. Unused lanes are zero: they push nothing.
+/// One point of each constraint, with its impulse. Unused lanes are zero: they push nothing.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct PointLanes {
-    pub(crate) anchor_a: V3,
-    pub(crate) anchor_b: V3,
-    pub(crate) adjusted_separation: f32x4,
-    pub(crate) normal_mass: f32x4,
-    pub(crate) tangent_mass: f32x4,
-    pub(crate) approach: f32x4,
-    pub(crate) max_impulse: f32x4,
-    pub(crate) normal: f32x4,
-    pub(crate) tangent: [f32x4; 2],
+    pub(crate) anchor: V3,
+    pub(crate) adjusted_separation: Lane,
+    pub(crate) normal_mass: Lane,
+    pub(crate) tangent_mass: Lane,
+    pub(crate) approach: Lane,
+    pub(crate) deviation: Lane,
+    pub(crate) total: [Lane; 3],
+    pub(crate) normal: Lane,
+    pub(crate) tangent: [Lane; 2],
 }
 
-/// What the points of four constraints share.
+/// What the points of a constraint share.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct HeadLanes {
     pub(crate) body_a: [u32; LANES],
     pub(crate) body_b: [u32; LANES],
     /// Points of each, as floats.
-    pub(crate) counts: f32x4,
+    pub(crate) counts: Lane,
     /// From the centre of mass of a to that of b, when the points were found.
     pub(crate) between: V3,
     pub(crate) normal: V3,
     pub(crate) tangents: [V3; 2],
-    pub(crate) friction: f32x4,
-    pub(crate) restitution: f32x4,
-    pub(crate) bias_rate: f32x4,
-    pub(crate) mass_scale: f32x4,
-    pub(crate) impulse_scale: f32x4,
-    pub(crate) remembered: f32x4,
-    pub(crate) round_a: f32x4,
-    pub(crate) round_b: f32x4,
+    pub(crate) friction: Lane,
+    pub(crate) restitution: Lane,
+    pub(crate) bias_rate: Lane,
+    pub(crate) mass_scale: Lane,
+    pub(crate) impulse_scale: Lane,
+    pub(crate) remembered: Lane,
+    pub(crate) round_a: Lane,
+    pub(crate) round_b: Lane,
 }
 
-/// Four constraints of one batch.
+/// Constraints of one batch.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct ConstraintLanes {
     pub(crate) head: HeadLanes,
@@ -143,11 +152,18 @@ impl ConstraintLanes {
         set(&mut head.round_b, lane, from.round_b);
     }
 
-    /// Puts a point with its impulse into a lane; masses and the other arm follow for all lanes at once.
-    pub(crate) fn set_point(&mut self, lane: usize, point: usize, at: &ManifoldPoint, impulse: &Impulse) {
+    /// Puts a point with what its slot remembers into a lane; masses and the other arm follow for all lanes at once.
+    pub(crate) fn set_point(
+        &mut self,
+        lane: usize,
+        point: usize,
+        at: &ManifoldPoint,
+        (impulse, deviation): (Impulse, f32),
+    ) {
         let to = &mut self.points[point];
-        to.anchor_a.set(lane, at.anchor);
+        to.anchor.set(lane, at.anchor);
         set(&mut to.adjusted_separation, lane, at.separation);
+        set(&mut to.deviation, lane, deviation);
         set(&mut to.normal, lane, impulse.normal);
         set(&mut to.tangent[0], lane, impulse.tangent[0]);
         set(&mut to.tangent[1], lane, impulse.tangent[1]);
@@ -170,39 +186,39 @@ impl ConstraintLanes {
 
     /// The arms of one point.
     pub(crate) fn arms(&self, point: usize) -> [V3; 2] {
-        [self.points[point].anchor_a, self.points[point].anchor_b]
+        push_lanes::arms(&self.head, &self.points[point])
     }
 
-    /// What the constraint of one lane remembers, per point.
-    pub(crate) fn remembered(&self, lane: usize) -> f32 {
-        self.head.remembered.as_array()[lane]
-    }
-
-    /// The accumulated impulse of one point of one lane.
-    pub(crate) fn impulse(&self, lane: usize, point: usize) -> (f32, [f32; 2]) {
-        let p = &self.points[point];
-        let at = |l: &f32x4| l.as_array()[lane];
-        (at(&p.normal), [at(&p.tangent[0]), at(&p.tangent[1])])
+    /// What the solver leaves of the constraint of one lane.
+    pub(crate) fn solved(&self, lane: usize) -> Solved {
+        let at = |l: &Lane| l.as_array()[lane];
+        let points = &self.points;
+        Solved {
+            impulses: std::array::from_fn(|k| (at(&points[k].normal), points[k].tangent.each_ref().map(at))),
+            totals: std::array::from_fn(|k| points[k].total.each_ref().map(at)),
+            remembered: at(&self.head.remembered),
+            deviations: std::array::from_fn(|k| at(&points[k].deviation)),
+        }
     }
 }
 
 /// What a constraint adds to a body's weights.
 pub(crate) struct Weights {
-    pub(crate) weight: f32x4,
-    pub(crate) weighted: f32x4,
+    pub(crate) weight: Lane,
+    pub(crate) weighted: Lane,
 }
 
-/// Four bodies. Rows 0 and 1 of [`SolverBody`] change in a visit.
+/// A body of each constraint. Rows 0 and 1 of [`SolverBody`] change in a visit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BodyLanes {
     pub(crate) linear: V3,
-    pub(crate) inverse_mass: f32x4,
+    pub(crate) inverse_mass: Lane,
     pub(crate) angular: V3,
     /// The field beside the angular velocity, carried along.
-    touched: f32x4,
+    touched: Lane,
     pub(crate) translation: V3,
-    pub(crate) eigenvalue: f32x4,
-    pub(crate) delta: [f32x4; 4],
+    pub(crate) eigenvalue: Lane,
+    pub(crate) delta: [Lane; 4],
     pub(crate) inertia_diagonal: V3,
     pub(crate) inertia_off: V3,
 }
@@ -212,16 +228,55 @@ const ROWS: usize = size_of::<SolverBody>() / 16;
 /// Row of the linear start with the weight; the next one has the angular start with what is weighted.
 const START: usize = 6;
 
+/// A row of each body, as its four numbers of all bodies.
+#[cfg(not(target_feature = "avx"))]
+#[inline(always)]
+fn columns(rows: [f32x4; LANES]) -> [Lane; 4] {
+    f32x4::transpose(rows)
+}
+
+/// The way back.
+#[cfg(not(target_feature = "avx"))]
+#[inline(always)]
+fn rows(columns: [Lane; 4]) -> [f32x4; LANES] {
+    f32x4::transpose(columns)
+}
+
+/// A row of each body, as its four numbers of all bodies.
+#[cfg(target_feature = "avx")]
+#[inline(always)]
+fn columns([a, b, c, d, e, f, g, h]: [f32x4; LANES]) -> [Lane; 4] {
+    let ([a, b, c, d], [e, f, g, h]) = (f32x4::transpose([a, b, c, d]), f32x4::transpose([e, f, g, h]));
+    [bytemuck::cast([a, e]), bytemuck::cast([b, f]), bytemuck::cast([c, g]), bytemuck::cast([d, h])]
+}
+
+/// The way back.
+#[cfg(target_feature = "avx")]
+#[inline(always)]
+fn rows([x, y, z, w]: [Lane; 4]) -> [f32x4; LANES] {
+    let half = |column: Lane| -> [f32x4; 2] { bytemuck::cast(column) };
+    let ([a, e], [b, f], [c, g], [d, h]) = (half(x), half(y), half(z), half(w));
+    let ([a, b, c, d], [e, f, g, h]) = (f32x4::transpose([a, b, c, d]), f32x4::transpose([e, f, g, h]));
+    [a, b, c, d, e, f, g, h]
+}
+
 impl BodyLanes {
-    /// Loads four bodies by `read`, which gives element i of the bodies seen as rows; without their change of pose when
+    /// Loads bodies by `read`, which gives element i of the bodies seen as rows; without their change of pose when
     /// `moved` is false.
     #[inline(always)]
     pub(crate) fn gather(read: impl Fn(usize) -> f32x4, index: [u32; LANES], moved: bool) -> Self {
-        let one = |i: u32, r: usize| if i == NO_BODY { f32x4::ZERO } else { read(ROWS * i as usize + r) };
-        let row = |r: usize| f32x4::transpose([one(index[0], r), one(index[1], r), one(index[2], r), one(index[3], r)]);
+        let row = |r: usize| {
+            let mut rows = [f32x4::ZERO; LANES];
+            for (row, &i) in rows.iter_mut().zip(&index) {
+                if i != NO_BODY {
+                    *row = read(ROWS * i as usize + r);
+                }
+            }
+            columns(rows)
+        };
         let [vx, vy, vz, inverse_mass] = row(0);
         let [wx, wy, wz, touched] = row(1);
-        let zero = [f32x4::ZERO; 4];
+        let zero = [Lane::ZERO; 4];
         let ([tx, ty, tz, eigenvalue], delta) = if moved { (row(2), row(3)) } else { (zero, zero) };
         let [dx, dy, dz, _] = row(4);
         let [ox, oy, oz, _] = row(5);
@@ -244,8 +299,8 @@ impl BodyLanes {
     /// No other thread touches any of those bodies meanwhile.
     #[inline(always)]
     pub(crate) unsafe fn scatter(self, bodies: &Shared<'_, f32x4>, index: [u32; LANES]) {
-        let linear = f32x4::transpose([self.linear.x, self.linear.y, self.linear.z, self.inverse_mass]);
-        let angular = f32x4::transpose([self.angular.x, self.angular.y, self.angular.z, self.touched]);
+        let linear = rows([self.linear.x, self.linear.y, self.linear.z, self.inverse_mass]);
+        let angular = rows([self.angular.x, self.angular.y, self.angular.z, self.touched]);
         for lane in 0..LANES {
             if self.inverse_mass.as_array()[lane] > 0.0 {
                 let row = ROWS * index[lane] as usize;
@@ -263,9 +318,9 @@ impl BodyLanes {
     /// As for [`BodyLanes::scatter`].
     #[inline(always)]
     pub(crate) unsafe fn weigh(&self, bodies: &Shared<'_, f32x4>, index: [u32; LANES], weights: Weights) {
-        for lane in 0..LANES {
+        for (lane, body) in index.into_iter().enumerate() {
             if self.inverse_mass.as_array()[lane] > 0.0 {
-                let row = ROWS * index[lane] as usize + START;
+                let row = ROWS * body as usize + START;
                 for (row, more) in [(row, weights.weight), (row + 1, weights.weighted)] {
                     // SAFETY: the caller's promise.
                     let mut start = unsafe { bodies.get(row) };
@@ -292,11 +347,11 @@ impl BodyLanes {
     ) {
         let linear = self.inverse_mass * push;
         let angular = self.inverse_inertia_times(r.cross(push));
-        for lane in 0..LANES {
+        for (lane, body) in index.into_iter().enumerate() {
             if self.inverse_mass.as_array()[lane] > 0.0 {
-                let row = ROWS * index[lane] as usize + START;
+                let row = ROWS * body as usize + START;
                 for (row, change) in [(row, linear), (row + 1, angular)] {
-                    let at = |v: f32x4| sign * v.as_array()[lane];
+                    let at = |v: Lane| sign * v.as_array()[lane];
                     // SAFETY: the caller's promise.
                     let start = unsafe { bodies.get(row) };
                     let more = f32x4::new([at(change.x), at(change.y), at(change.z), 0.0]);
@@ -323,7 +378,7 @@ impl BodyLanes {
     pub(crate) fn turned(&self, r: V3) -> V3 {
         let [x, y, z, w] = self.delta;
         let b = V3::new(x, y, z);
-        let t = f32x4::splat(2.0) * b.cross(r);
+        let t = Lane::splat(2.0) * b.cross(r);
         r + w * t + b.cross(t)
     }
 }

@@ -1,5 +1,6 @@
 //! Stage `solver`: rows (`prepare`), the laws of a visit (`one_pass` and `soft`, on `push`; four constraints at a time
-//! in those called `_lanes`), the passes over batches (here), and the way back to the store (`store`). Twin of
+//! in those called `_lanes`), the passes over
+//! batches (`passes`; in plain form here), and the way back to the store (`store`). Twin of
 //! `shaders/solver/`.
 //!
 //! Contacts are found once a step and solved in sub-steps (Macklin et al., "Small Steps in Physics Simulation", SCA
@@ -16,6 +17,7 @@
 mod lanes;
 pub mod one_pass;
 mod one_pass_lanes;
+mod passes;
 pub mod prepare;
 mod prepare_lanes;
 mod push;
@@ -26,10 +28,10 @@ pub mod store;
 
 use crate::math::tangents;
 use crate::motion;
-use crate::shared::Shared;
-use lanes::{BodyLanes, ConstraintLanes, LANES};
+use lanes::{ConstraintLanes, LANES};
 use prepare::Contact;
 use rayon::prelude::*;
+use store::Solved;
 use tumble_core::layout::{
     BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Impulse, LAST_BATCH, SolverBody, StepParams,
     solver,
@@ -121,7 +123,7 @@ impl Rows {
                 let manifold = contact.manifold;
                 group.set_head(lane, &prepare::prepare_head(&contact, colliders, bodies, step), manifold.between);
                 for point in 0..manifold.count as usize {
-                    group.set_point(lane, point, &manifold.points[point], &prepare::carry(&contact, point));
+                    group.set_point(lane, point, &manifold.points[point], prepare::carry(&contact, point));
                 }
             }
             prepare_lanes::prepare(group, rows);
@@ -131,70 +133,21 @@ impl Rows {
         self.last = PlainRows::build(last, |c| prepare::prepare_constraint(&contact(c), colliders, bodies, step));
     }
 
-    /// Calls `take(c, remembered, impulses)` for every constraint, with (normal, tangent) of its four points, used or not;
-    /// from many threads at once.
-    pub fn for_each_constraint(&self, take: impl Fn(usize, f32, [(f32, [f32; 2]); 4]) + Sync) {
+    /// Calls `take(c, solved)` for every constraint, from many threads at once.
+    pub fn for_each_constraint(&self, take: impl Fn(usize, &Solved) + Sync) {
         self.groups.par_iter().zip(&self.members).with_min_len(64).for_each(|(group, &(first, count))| {
             for lane in 0..count as usize {
-                let impulses = std::array::from_fn(|point| group.impulse(lane, point));
-                take(first as usize + lane, group.remembered(lane), impulses);
+                take(first as usize + lane, &group.solved(lane));
             }
         });
-        for (i, (head, four)) in self.last.heads.iter().zip(self.last.impulses.chunks_exact(4)).enumerate() {
-            let impulses = std::array::from_fn(|point| (four[point].normal, four[point].tangent));
-            take(self.last_first + i, head.remembered, impulses);
+        for c in 0..self.last.heads.len() {
+            take(self.last_first + c, &self.last.solved(c));
         }
     }
 
     /// Bytes that the rows hold.
     pub(crate) fn bytes(&self) -> u64 {
         (self.groups.capacity() * (size_of::<ConstraintLanes>() + 8)) as u64
-    }
-
-    fn sweep(&mut self, bodies: &mut [SolverBody], step: &StepParams, visit: Visit) {
-        for batch in 0..LAST_BATCH as usize {
-            let groups = &mut self.groups[self.group_start[batch]..self.group_start[batch + 1]];
-            if groups.is_empty() {
-                continue;
-            }
-            let shared = Shared::new(bytemuck::cast_slice_mut::<SolverBody, f32x4>(bodies));
-            let moved = !matches!(visit, Visit::WarmStart | Visit::Restitution);
-            groups.par_iter_mut().with_min_len(64).for_each(|group| {
-                // SAFETY: constraints of one batch share no moving body (`batch`), and bodies that do not move are
-                // never written (`scatter`).
-                let read = |i: usize| unsafe { shared.get(i) };
-                let (ia, ib) = (group.head.body_a, group.head.body_b);
-                let mut a = BodyLanes::gather(read, ia, moved);
-                let mut b = BodyLanes::gather(read, ib, moved);
-                match visit {
-                    Visit::WarmStart => group.warm_start(&mut a, &mut b),
-                    Visit::Solve | Visit::Relax => soft_lanes::visit(visit, group, &mut a, &mut b, step),
-                    Visit::Load => {
-                        let [more_a, more_b] = one_pass_lanes::load(group, &mut a, &mut b);
-                        // SAFETY: as above.
-                        unsafe { a.weigh(&shared, ia, more_a) };
-                        // SAFETY: as above.
-                        unsafe { b.weigh(&shared, ib, more_b) };
-                    }
-                    Visit::Pass => {
-                        let blows = one_pass_lanes::pass(group, &mut a, &mut b, step);
-                        for (point, push) in blows.into_iter().enumerate().filter_map(|(k, push)| Some((k, push?))) {
-                            let [ra, rb] = group.arms(point);
-                            // SAFETY: as above.
-                            unsafe { a.start_after(&shared, ia, -1.0, ra, push) };
-                            // SAFETY: as above.
-                            unsafe { b.start_after(&shared, ib, 1.0, rb, push) };
-                        }
-                    }
-                    Visit::Restitution => group.bounce(&mut a, &mut b, step),
-                }
-                // SAFETY: as above.
-                unsafe { a.scatter(&shared, ia) };
-                // SAFETY: as above.
-                unsafe { b.scatter(&shared, ib) };
-            });
-        }
-        self.last.sweep(bodies, step, visit);
     }
 }
 
@@ -209,6 +162,17 @@ impl PlainRows {
             rows.impulses.extend(impulses);
         }
         rows
+    }
+
+    /// What the solver leaves of constraint c.
+    pub fn solved(&self, c: usize) -> Solved {
+        let (points, impulses) = (&self.points[4 * c..][..4], &self.impulses[4 * c..][..4]);
+        Solved {
+            impulses: std::array::from_fn(|k| (impulses[k].normal, impulses[k].tangent)),
+            totals: std::array::from_fn(|k| points[k].total),
+            remembered: self.heads[c].remembered,
+            deviations: std::array::from_fn(|k| points[k].deviation),
+        }
     }
 
     /// One visit to every constraint, in order. Within a batch the order is of no account.
@@ -238,43 +202,59 @@ impl PlainRows {
     }
 }
 
-/// Runs all sub-steps, by the law of `step.solver`.
-pub fn solve(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, restitution: bool) {
-    substeps(bodies, step, restitution, |bodies, visit| rows.sweep(bodies, step, visit));
-}
-
-/// The same in plain rows, one constraint after the other: what `solve` is tested against.
-pub fn solve_plain(rows: &mut PlainRows, bodies: Bodies<'_>, step: &StepParams, restitution: bool) {
-    substeps(bodies, step, restitution, |bodies, visit| rows.sweep(bodies, step, visit));
-}
-
-fn substeps(bodies: Bodies<'_>, step: &StepParams, restitution: bool, mut sweep: impl FnMut(&mut [SolverBody], Visit)) {
-    let Bodies { solver, states, props } = bodies;
-    let each = |solver: &mut [SolverBody], pass: BodyPass| {
-        solver.par_iter_mut().zip(states.par_iter().zip(props)).with_min_len(512).for_each(|(body, (state, props))| {
-            pass(body, state, props, step);
-        });
-    };
-    if step.solver == solver::SOFT {
-        for _ in 0..step.substeps {
-            each(solver, motion::integrate_velocity);
-            sweep(solver, Visit::WarmStart);
-            sweep(solver, Visit::Solve);
-            each(solver, motion::integrate_position);
-            sweep(solver, Visit::Relax);
-        }
-    } else {
-        each(solver, motion::first_substep);
-        sweep(solver, Visit::Load);
-        for substep in 1..=step.substeps {
-            sweep(solver, Visit::Pass);
-            each(solver, if substep < step.substeps { motion::next_substep } else { motion::last_substep });
-        }
-    }
-    if restitution {
-        sweep(solver, Visit::Restitution);
-    }
+/// One pass of a step's schedule.
+#[derive(Debug, Clone, Copy)]
+enum Pass {
+    /// Over all bodies.
+    Bodies(BodyPass),
+    /// A visit to every constraint.
+    Sweep(Visit),
 }
 
 /// What is done to each body.
 type BodyPass = fn(&mut SolverBody, &BodyState, &BodyProps, &StepParams);
+
+/// Runs all sub-steps, by the law of `step.solver`.
+pub fn solve(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, restitution: bool) {
+    passes::run(rows, bodies, step, &schedule(step, restitution));
+}
+
+/// The same in plain rows, one constraint after the other: what `solve` is tested against.
+pub fn solve_plain(rows: &mut PlainRows, bodies: Bodies<'_>, step: &StepParams, restitution: bool) {
+    let Bodies { solver, states, props } = bodies;
+    for pass in schedule(step, restitution) {
+        match pass {
+            Pass::Bodies(each) => (0..solver.len()).for_each(|i| each(&mut solver[i], &states[i], &props[i], step)),
+            Pass::Sweep(visit) => rows.sweep(solver, step, visit),
+        }
+    }
+}
+
+/// The passes of a step, in order.
+fn schedule(step: &StepParams, restitution: bool) -> Vec<Pass> {
+    let mut passes = Vec::new();
+    if step.solver == solver::SOFT {
+        for _ in 0..step.substeps {
+            passes.push(Pass::Bodies(motion::integrate_velocity));
+            passes.push(Pass::Sweep(Visit::WarmStart));
+            passes.push(Pass::Sweep(Visit::Solve));
+            passes.push(Pass::Bodies(motion::integrate_position));
+            passes.push(Pass::Sweep(Visit::Relax));
+        }
+    } else {
+        passes.push(Pass::Bodies(motion::first_substep));
+        passes.push(Pass::Sweep(Visit::Load));
+        for substep in 1..=step.substeps {
+            passes.push(Pass::Sweep(Visit::Pass));
+            passes.push(Pass::Bodies(if substep < step.substeps {
+                motion::next_substep
+            } else {
+                motion::last_substep
+            }));
+        }
+    }
+    if restitution {
+        passes.push(Pass::Sweep(Visit::Restitution));
+    }
+    passes
+}

@@ -3,8 +3,9 @@
 //! Between sub-steps the bodies alone carry impulses and gravity over (`motion::next_substep`), so that no visit is
 //! spent on a warm start but the first. A contact is a damped spring of `stiffness` mass / h²: the leak that damps it lets
 //! it give way by load h² / (stiffness mass). Here the leak leads not to zero but to a remembered impulse, which follows
-//! the mean impulse of the manifold's points; once it has caught up, nothing gives way. (Per point it would make columns
-//! topple.)
+//! the impulses: the mean over the manifold's points, and much more slowly what each has more or less. Once it has caught
+//! up, nothing gives way. (Were the points quicker, columns would sway and topple: what holds them upright is that an end
+//! which bears more gives way.)
 //!
 //! How fast it may follow: with a rate of less than (1 - stiffness) e / leak the two do not swing, e being the smallest
 //! eigenvalue of D^-1 A, A the matrix of contacts and D its diagonal. For the load as it is, e is no more than the
@@ -13,7 +14,7 @@
 //! its neighbours' along the load, step by step. The weighted mean stays that of the whole, so that the bound holds, and
 //! every part of a pile gets the rate of its own neighbourhood, with no sum over islands.
 
-use super::push::{apply, push_tangent, relative_velocity, separation, warm_start};
+use super::push::{apply, arms, count, push_tangent, relative_velocity, separation, warm_start};
 use crate::math::{finite, inverse_inertia_times, quat, rotate_back, vec3};
 use glam::Vec3;
 use tumble_core::layout::{BodyProps, BodyState, ConstraintHead, ConstraintPoint, Impulse, SolverBody, StepParams};
@@ -22,6 +23,9 @@ use tumble_core::layout::{BodyProps, BodyState, ConstraintHead, ConstraintPoint,
 pub const EASE_MIX: f32 = 0.95;
 /// No eigenvalue of D^-1 A is larger.
 pub const MAX_EIGENVALUE: f32 = 4.0;
+/// What a point has more or less than the mean is remembered at this times the square of the mean's rate, a sub-step: a
+/// twentieth of it at most, and next to nothing where loads are so soft that a column might sway.
+pub const DEVIATION: f32 = 2.5;
 /// Share of the memory that is left, each sub-step, of a contact that does not push.
 pub const FADE: f32 = 0.9;
 
@@ -50,7 +54,7 @@ pub(super) fn load(
 /// One visit to one constraint: normals first, then friction within the cone that they allow, then the memory.
 pub(super) fn pass(
     head: &mut ConstraintHead,
-    [t1, t2]: [Vec3; 2],
+    tangents: [Vec3; 2],
     points: &mut [ConstraintPoint],
     impulses: &mut [Impulse],
     a: &mut SolverBody,
@@ -62,17 +66,19 @@ pub(super) fn pass(
         before[k] = (impulse.normal, impulse.tangent);
         push_normal(head, point, impulse, a, b, step);
     }
-    for (point, impulse) in points.iter().zip(impulses.iter_mut()) {
-        push_tangent(head.friction, t1, t2, point, impulse, a, b);
+    for (point, impulse) in points.iter_mut().zip(impulses.iter_mut()) {
+        push_tangent(head, tangents, point, impulse, a, b);
+        count(point, impulse);
     }
-    remember(head, impulses, a, b, step);
+    remember(head, points, impulses, a, b, step);
     for (k, (point, impulse)) in points.iter().zip(impulses).enumerate() {
         // A blow is given once: the next sub-step starts without it.
         let (normal, tangent) = before[k];
         let blow = impulse.normal - normal;
         if blow > step.blow_speed * point.normal_mass {
             let (x, y) = (impulse.tangent[0] - tangent[0], impulse.tangent[1] - tangent[1]);
-            start_after(point, blow * vec3(head.normal) + x * t1 + y * t2, a, b);
+            let push = blow * vec3(head.normal) + x * tangents[0] + y * tangents[1];
+            start_after(arms(head, point), push, a, b);
             (impulse.normal, impulse.tangent) = (normal, tangent);
         }
     }
@@ -89,18 +95,16 @@ fn push_normal(
     step: &StepParams,
 ) {
     let normal = vec3(head.normal);
-    let (ra, rb) = (vec3(point.anchor_a), vec3(point.anchor_b));
+    let [ra, rb] = arms(head, point);
     let velocity = normal.dot(relative_velocity(a, b, ra, rb));
     let separation = separation(head, point, a, b);
-    if point.max_impulse == 0.0 {
-        point.approach = point.approach.min(velocity);
-    }
     let mass = point.normal_mass;
-    let pressed = impulse.normal > 0.0 && separation * mass < step.memory_band * head.remembered;
+    let remembered = head.remembered + point.deviation;
+    let pressed = impulse.normal > 0.0 && separation * mass < step.memory_band * remembered;
     let change = if separation > 0.0 && !pressed {
         -mass * (velocity + separation * step.inverse_h)
     } else {
-        let leak = head.impulse_scale * (impulse.normal - head.remembered);
+        let leak = head.impulse_scale * (impulse.normal - remembered);
         let spring = head.mass_scale * mass * head.bias_rate * separation;
         let pull = (spring + leak).max(-step.push_speed * mass);
         -(head.mass_scale * mass * velocity + pull)
@@ -111,19 +115,35 @@ fn push_normal(
         let new = sum.max(0.0);
         let push = new - impulse.normal;
         impulse.normal = new;
-        point.max_impulse = point.max_impulse.max(new);
         apply(a, b, ra, rb, push * normal);
+        // Without the last sub-step's gravity: a bounce must not gain by it.
+        if new == 0.0 && point.total[0] == 0.0 {
+            point.approach = point.approach.min(velocity);
+        }
     }
 }
 
-/// The memory follows the mean impulse of the points.
-fn remember(head: &mut ConstraintHead, impulses: &[Impulse], a: &SolverBody, b: &SolverBody, step: &StepParams) {
+/// The memory follows: the mean that of the impulses, and each point's deviation from it theirs.
+fn remember(
+    head: &mut ConstraintHead,
+    points: &mut [ConstraintPoint],
+    impulses: &[Impulse],
+    a: &SolverBody,
+    b: &SolverBody,
+    step: &StepParams,
+) {
     let mean = impulses.iter().map(|i| i.normal).fold(0.0, |sum, normal| sum + normal) / head.count as f32;
     let [from_a, from_b] = eigenvalues(a, b);
     let rate = (step.memory_gain * (from_a + from_b)).min(step.memory_limit);
     let remembered =
         if mean > 0.0 { head.remembered + rate * (mean - head.remembered) } else { FADE * head.remembered };
     head.remembered = remembered;
+    for (point, impulse) in points.iter_mut().zip(impulses) {
+        let more = impulse.normal - mean;
+        let own = (remembered + point.deviation + DEVIATION * rate * rate * (more - point.deviation)).max(0.0);
+        let own = if impulse.normal > 0.0 { own } else { FADE * own.min(remembered) };
+        point.deviation = own - remembered;
+    }
 }
 
 /// The bodies' eigenvalues; one that does not move has the other's.
@@ -135,8 +155,7 @@ fn eigenvalues(a: &SolverBody, b: &SolverBody) -> [f32; 2] {
 }
 
 /// Counts `push` to what the sub-step began with.
-fn start_after(point: &ConstraintPoint, push: Vec3, a: &mut SolverBody, b: &mut SolverBody) {
-    let (ra, rb) = (vec3(point.anchor_a), vec3(point.anchor_b));
+fn start_after([ra, rb]: [Vec3; 2], push: Vec3, a: &mut SolverBody, b: &mut SolverBody) {
     a.linear_start = (vec3(a.linear_start) - a.inverse_mass * push).to_array();
     a.angular_start = (vec3(a.angular_start) - inverse_inertia_times(a, ra.cross(push))).to_array();
     b.linear_start = (vec3(b.linear_start) + b.inverse_mass * push).to_array();

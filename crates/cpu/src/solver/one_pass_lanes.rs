@@ -1,17 +1,16 @@
-//! The law of `one_pass`, four constraints at a time: the same operations in the same order, so the same results.
+//! The law of `one_pass`, several constraints at a time: the same operations in the same order, so the same results.
 
-use super::lanes::{BodyLanes, ConstraintLanes, HeadLanes, LANES, PointLanes, V3, Weights};
-use super::one_pass::FADE;
-use super::push_lanes::{apply, push_tangent, separation, warm_start};
+use super::lanes::{BodyLanes, ConstraintLanes, HeadLanes, Lane, PointLanes, V3, Weights};
+use super::one_pass::{DEVIATION, FADE};
+use super::push_lanes::{apply, arms, count, push_tangent, separation, warm_start};
 use tumble_core::layout::StepParams;
-use wide::f32x4;
 
 /// Applies the stored impulses; what each body's weights grow by.
 #[inline(always)]
 pub(super) fn load(c: &mut ConstraintLanes, a: &mut BodyLanes, b: &mut BodyLanes) -> [Weights; 2] {
     let (head, points) = c.split();
     warm_start(head, points, a, b);
-    let mut weight = f32x4::ZERO;
+    let mut weight = Lane::ZERO;
     for p in points {
         let [x, y] = p.tangent;
         weight += over(p.normal * p.normal, p.normal_mass) + over(x * x + y * y, p.tangent_mass);
@@ -20,7 +19,7 @@ pub(super) fn load(c: &mut ConstraintLanes, a: &mut BodyLanes, b: &mut BodyLanes
     [Weights { weight, weighted: weight * from_b }, Weights { weight, weighted: weight * from_a }]
 }
 
-/// One visit to four constraints of one batch. The push that is to be counted to what the sub-step began with, of each
+/// One visit to the constraints of a group. The push that is to be counted to what the sub-step began with, of each
 /// point that had one.
 #[inline(always)]
 pub(super) fn pass(
@@ -30,19 +29,20 @@ pub(super) fn pass(
     step: &StepParams,
 ) -> [Option<V3>; 4] {
     let (head, points) = c.split();
-    let mut before = [(f32x4::ZERO, [f32x4::ZERO; 2]); LANES];
+    let mut before = [(Lane::ZERO, [Lane::ZERO; 2]); 4];
     for (before, p) in before.iter_mut().zip(points.iter_mut()) {
         *before = (p.normal, p.tangent);
         push_normal(head, p, a, b, step);
     }
     for p in points.iter_mut() {
         push_tangent(head, p, a, b);
+        count(p);
     }
     remember(head, points, a, b, step);
     let mut blows = [None; 4];
     for ((blown, (normal, tangent)), p) in blows.iter_mut().zip(before).zip(points) {
         let blow = p.normal - normal;
-        let hard = blow.simd_gt(f32x4::splat(step.blow_speed) * p.normal_mass);
+        let hard = blow.simd_gt(Lane::splat(step.blow_speed) * p.normal_mass);
         if hard.any() {
             let (x, y) = (p.tangent[0] - tangent[0], p.tangent[1] - tangent[1]);
             let push = blow * head.normal + x * head.tangents[0] + y * head.tangents[1];
@@ -56,51 +56,60 @@ pub(super) fn pass(
 
 #[inline(always)]
 fn push_normal(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLanes, b: &mut BodyLanes, step: &StepParams) {
-    let (normal, ra, rb, mass) = (head.normal, p.anchor_a, p.anchor_b, p.normal_mass);
+    let (normal, [ra, rb], mass) = (head.normal, arms(head, p), p.normal_mass);
     let velocity = normal.dot(b.velocity_at(rb) - a.velocity_at(ra));
     let separation = separation(head, p, a, b);
-    let first = p.max_impulse.simd_eq(f32x4::ZERO);
-    p.approach = first.bitselect(p.approach.fast_min(velocity), p.approach);
-    let band = f32x4::splat(step.memory_band) * head.remembered;
-    let pressed = p.normal.simd_gt(f32x4::ZERO) & (separation * mass).simd_lt(band);
-    let apart = separation.simd_gt(f32x4::ZERO) & !pressed;
-    let close = -mass * (velocity + separation * f32x4::splat(step.inverse_h));
-    let leak = head.impulse_scale * (p.normal - head.remembered);
+    let remembered = head.remembered + p.deviation;
+    let band = Lane::splat(step.memory_band) * remembered;
+    let pressed = p.normal.simd_gt(Lane::ZERO) & (separation * mass).simd_lt(band);
+    let apart = separation.simd_gt(Lane::ZERO) & !pressed;
+    let close = -mass * (velocity + separation * Lane::splat(step.inverse_h));
+    let leak = head.impulse_scale * (p.normal - remembered);
     let spring = head.mass_scale * mass * head.bias_rate * separation;
-    let pull = (spring + leak).fast_max(f32x4::splat(-step.push_speed) * mass);
+    let pull = (spring + leak).fast_max(Lane::splat(-step.push_speed) * mass);
     let press = -(head.mass_scale * mass * velocity + pull);
     let sum = p.normal + apart.bitselect(close, press);
-    let new = sum.fast_max(f32x4::ZERO);
+    let new = sum.fast_max(Lane::ZERO);
     let push = new - p.normal;
     let good = sum.is_finite();
-    let push = good.bitselect(push, f32x4::ZERO);
+    let push = good.bitselect(push, Lane::ZERO);
     p.normal = good.bitselect(new, p.normal);
-    p.max_impulse = good.bitselect(p.max_impulse.fast_max(new), p.max_impulse);
+    let free = good & new.simd_eq(Lane::ZERO) & p.total[0].simd_eq(Lane::ZERO);
+    p.approach = free.bitselect(p.approach.fast_min(velocity), p.approach);
     apply(a, b, ra, rb, push * normal);
 }
 
 #[inline(always)]
-fn remember(head: &mut HeadLanes, points: &[PointLanes], a: &BodyLanes, b: &BodyLanes, step: &StepParams) {
-    let mut sum = f32x4::ZERO;
-    for p in points {
+fn remember(head: &mut HeadLanes, points: &mut [PointLanes], a: &BodyLanes, b: &BodyLanes, step: &StepParams) {
+    let mut sum = Lane::ZERO;
+    for p in points.iter() {
         sum += p.normal;
     }
     // A lane without a constraint has no points.
-    let mean = sum / head.counts.fast_max(f32x4::ONE);
+    let mean = sum / head.counts.fast_max(Lane::ONE);
     let [from_a, from_b] = eigenvalues(a, b);
-    let rate = (f32x4::splat(step.memory_gain) * (from_a + from_b)).fast_min(f32x4::splat(step.memory_limit));
+    let rate = (Lane::splat(step.memory_gain) * (from_a + from_b)).fast_min(Lane::splat(step.memory_limit));
     let followed = head.remembered + rate * (mean - head.remembered);
-    head.remembered = mean.simd_gt(f32x4::ZERO).bitselect(followed, f32x4::splat(FADE) * head.remembered);
+    let remembered = mean.simd_gt(Lane::ZERO).bitselect(followed, Lane::splat(FADE) * head.remembered);
+    head.remembered = remembered;
+    for (k, p) in points.iter_mut().enumerate() {
+        let used = head.counts.simd_gt(Lane::splat(k as f32));
+        let more = p.normal - mean;
+        let own = remembered + p.deviation + Lane::splat(DEVIATION) * rate * rate * (more - p.deviation);
+        let own = own.fast_max(Lane::ZERO);
+        let own = p.normal.simd_gt(Lane::ZERO).bitselect(own, Lane::splat(FADE) * own.fast_min(remembered));
+        p.deviation = used & (own - remembered);
+    }
 }
 
 #[inline(always)]
-fn eigenvalues(a: &BodyLanes, b: &BodyLanes) -> [f32x4; 2] {
+fn eigenvalues(a: &BodyLanes, b: &BodyLanes) -> [Lane; 2] {
     [
-        a.inverse_mass.simd_gt(f32x4::ZERO).bitselect(a.eigenvalue, b.eigenvalue),
-        b.inverse_mass.simd_gt(f32x4::ZERO).bitselect(b.eigenvalue, a.eigenvalue),
+        a.inverse_mass.simd_gt(Lane::ZERO).bitselect(a.eigenvalue, b.eigenvalue),
+        b.inverse_mass.simd_gt(Lane::ZERO).bitselect(b.eigenvalue, a.eigenvalue),
     ]
 }
 
-fn over(square: f32x4, mass: f32x4) -> f32x4 {
-    mass.simd_gt(f32x4::ZERO) & (square / mass)
+fn over(square: Lane, mass: Lane) -> Lane {
+    mass.simd_gt(Lane::ZERO) & (square / mass)
 }

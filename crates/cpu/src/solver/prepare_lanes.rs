@@ -1,6 +1,7 @@
-//! The points of `prepare`, four constraints at a time: the same operations in the same order, so the same results.
+//! The points of `prepare`, several constraints at a time: the same operations in the same order, so the same results.
 
-use super::lanes::{BodyLanes, ConstraintLanes, V3};
+use super::lanes::{BodyLanes, ConstraintLanes, Lane, V3};
+use super::push_lanes::arms;
 use wide::f32x4;
 
 /// Fills in what follows from the geometry: tangents, the other arm, masses, approach. `bodies` as rows.
@@ -11,16 +12,14 @@ pub(super) fn prepare(c: &mut ConstraintLanes, bodies: &[f32x4]) {
     let normal = head.normal;
     head.tangents = tangents(normal);
     let [t1, t2] = head.tangents;
-    let half = f32x4::splat(0.5);
+    let half = Lane::splat(0.5);
     for (k, p) in points.iter_mut().enumerate() {
-        let used = head.counts.simd_gt(f32x4::splat(k as f32));
-        let ra = p.anchor_a;
-        let rb = ra - head.between;
+        let used = head.counts.simd_gt(Lane::splat(k as f32));
+        let [ra, rb] = arms(head, p);
         let along = |u: V3, v: V3| response(&a, &b, ra, rb, u, v);
         let (k11, k12, k22) = (along(t1, t1), along(t1, t2), along(t2, t2));
-        let apart = f32x4::splat(0.25) * (k11 - k22) * (k11 - k22) + k12 * k12;
+        let apart = Lane::splat(0.25) * (k11 - k22) * (k11 - k22) + k12 * k12;
         let stiffest = half * (k11 + k22) + apart.sqrt();
-        p.anchor_b = rb;
         p.adjusted_separation -= normal.dot(rb - ra) - (head.round_b - head.round_a);
         p.normal_mass = used & inverse(along(normal, normal));
         p.tangent_mass = used & inverse(stiffest);
@@ -29,22 +28,22 @@ pub(super) fn prepare(c: &mut ConstraintLanes, bodies: &[f32x4]) {
 }
 
 fn tangents(n: V3) -> [V3; 2] {
-    let flat = n.x.abs().simd_lt(f32x4::splat(0.577_350_3));
-    let t = V3::new(flat.bitselect(f32x4::ZERO, n.y), flat.bitselect(n.z, -n.x), flat.bitselect(-n.y, f32x4::ZERO));
+    let flat = n.x.abs().simd_lt(Lane::splat(0.577_350_3));
+    let t = V3::new(flat.bitselect(Lane::ZERO, n.y), flat.bitselect(n.z, -n.x), flat.bitselect(-n.y, Lane::ZERO));
     let length = t.dot(t).sqrt();
-    let t = (f32x4::ONE / length) * t;
+    let t = (Lane::ONE / length) * t;
     // A lane without a constraint has no normal, and must not make others' numbers slow or its own infinite.
-    let good = length.simd_gt(f32x4::ZERO);
+    let good = length.simd_gt(Lane::ZERO);
     let t = V3::new(good & t.x, good & t.y, good & t.z);
     [t, n.cross(t)]
 }
 
-fn response(a: &BodyLanes, b: &BodyLanes, ra: V3, rb: V3, u: V3, v: V3) -> f32x4 {
+fn response(a: &BodyLanes, b: &BodyLanes, ra: V3, rb: V3, u: V3, v: V3) -> Lane {
     let turn_a = a.inverse_inertia_times(ra.cross(u)).cross(ra);
     let turn_b = b.inverse_inertia_times(rb.cross(u)).cross(rb);
     (a.inverse_mass + b.inverse_mass) * u.dot(v) + v.dot(turn_a + turn_b)
 }
 
-fn inverse(x: f32x4) -> f32x4 {
-    x.simd_gt(f32x4::ZERO) & (f32x4::ONE / x)
+fn inverse(x: Lane) -> Lane {
+    x.simd_gt(Lane::ZERO) & (Lane::ONE / x)
 }

@@ -16,15 +16,22 @@ pub(super) fn warm_start(
 ) {
     for (point, impulse) in points.iter().zip(impulses) {
         let push = impulse.normal * vec3(head.normal) + impulse.tangent[0] * t1 + impulse.tangent[1] * t2;
-        apply(a, b, vec3(point.anchor_a), vec3(point.anchor_b), push);
+        let [ra, rb] = arms(head, point);
+        apply(a, b, ra, rb, push);
     }
+}
+
+/// From the bodies' centres of mass to a point.
+pub(super) fn arms(head: &ConstraintHead, point: &ConstraintPoint) -> [Vec3; 2] {
+    let ra = vec3(point.anchor);
+    [ra, ra - vec3(head.between)]
 }
 
 /// Gap at a point now; the normal is held, the arms turn with the bodies but for their round parts.
 pub(super) fn separation(head: &ConstraintHead, point: &ConstraintPoint, a: &SolverBody, b: &SolverBody) -> f32 {
     let normal = vec3(head.normal);
-    let core_a = vec3(point.anchor_a) - head.round_a * normal;
-    let core_b = vec3(point.anchor_b) - head.round_b * normal;
+    let [ra, rb] = arms(head, point);
+    let (core_a, core_b) = (ra - head.round_a * normal, rb - head.round_b * normal);
     let (from_a, from_b) = (rotate(quat(a.delta), core_a), rotate(quat(b.delta), core_b));
     let moved = vec3(b.translation) - vec3(a.translation) + from_b - from_a;
     point.adjusted_separation + normal.dot(moved)
@@ -32,20 +39,19 @@ pub(super) fn separation(head: &ConstraintHead, point: &ConstraintPoint, a: &Sol
 
 /// Friction against the sliding velocity, within the cone.
 pub(super) fn push_tangent(
-    friction: f32,
-    t1: Vec3,
-    t2: Vec3,
+    head: &ConstraintHead,
+    [t1, t2]: [Vec3; 2],
     point: &ConstraintPoint,
     impulse: &mut Impulse,
     a: &mut SolverBody,
     b: &mut SolverBody,
 ) {
-    let (ra, rb) = (vec3(point.anchor_a), vec3(point.anchor_b));
+    let [ra, rb] = arms(head, point);
     let slide = relative_velocity(a, b, ra, rb);
     let mut x = impulse.tangent[0] - point.tangent_mass * t1.dot(slide);
     let mut y = impulse.tangent[1] - point.tangent_mass * t2.dot(slide);
     let length = (x * x + y * y).sqrt();
-    let most = friction * impulse.normal;
+    let most = head.friction * impulse.normal;
     if length > most {
         let scale = most / length;
         x *= scale;
@@ -58,41 +64,47 @@ pub(super) fn push_tangent(
     }
 }
 
-/// Bounces of all points of one constraint.
+/// Counts a sub-step's impulse.
+pub(super) fn count(point: &mut ConstraintPoint, impulse: &Impulse) {
+    point.total[0] += impulse.normal;
+    point.total[1] += impulse.tangent[0];
+    point.total[2] += impulse.tangent[1];
+}
+
+/// Gives back a share of the speed at which the points met, where they met fast enough and pushed at all.
 pub(super) fn restitution(
     head: &ConstraintHead,
-    points: &[ConstraintPoint],
+    points: &mut [ConstraintPoint],
     impulses: &mut [Impulse],
     a: &mut SolverBody,
     b: &mut SolverBody,
     step: &StepParams,
 ) {
-    for (point, impulse) in points.iter().zip(impulses) {
-        bounce(head.restitution, vec3(head.normal), point, impulse, a, b, step);
+    for (point, impulse) in points.iter_mut().zip(impulses) {
+        bounce(head, point, impulse, a, b, step);
     }
 }
 
-/// Gives back a share of the speed at which the points met, where they met fast enough and pushed at all.
 fn bounce(
-    restitution: f32,
-    normal: Vec3,
-    point: &ConstraintPoint,
+    head: &ConstraintHead,
+    point: &mut ConstraintPoint,
     impulse: &mut Impulse,
     a: &mut SolverBody,
     b: &mut SolverBody,
     step: &StepParams,
 ) {
-    if restitution == 0.0 || point.approach > -step.restitution_threshold || point.max_impulse == 0.0 {
+    if head.restitution == 0.0 || point.approach > -step.restitution_threshold || point.total[0] == 0.0 {
         return;
     }
-    let (ra, rb) = (vec3(point.anchor_a), vec3(point.anchor_b));
+    let (normal, [ra, rb]) = (vec3(head.normal), arms(head, point));
     let velocity = normal.dot(relative_velocity(a, b, ra, rb));
-    let change = -point.normal_mass * (velocity + restitution * point.approach);
+    let change = -point.normal_mass * (velocity + head.restitution * point.approach);
     let sum = impulse.normal + change;
     if finite([sum; 3]) {
         let new = sum.max(0.0);
         let push = new - impulse.normal;
         impulse.normal = new;
+        point.total[0] += push;
         apply(a, b, ra, rb, push * normal);
     }
 }

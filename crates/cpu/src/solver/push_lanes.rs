@@ -1,36 +1,50 @@
-//! What the laws of `push` do, four constraints at a time: the same operations in the same order, so the same results.
+//! What the laws of `push` do, several constraints at a time: the same operations in the same order, so the same results.
 
-use super::lanes::{BodyLanes, HeadLanes, PointLanes, V3};
+use super::lanes::{BodyLanes, HeadLanes, Lane, PointLanes, V3};
 use tumble_core::layout::StepParams;
-use wide::f32x4;
 
 #[inline(always)]
 pub(super) fn warm_start(head: &HeadLanes, points: &[PointLanes], a: &mut BodyLanes, b: &mut BodyLanes) {
     let (normal, [t1, t2]) = (head.normal, head.tangents);
     for p in points {
         let push = p.normal * normal + p.tangent[0] * t1 + p.tangent[1] * t2;
-        apply(a, b, p.anchor_a, p.anchor_b, push);
+        let [ra, rb] = arms(head, p);
+        apply(a, b, ra, rb, push);
     }
+}
+
+/// From the bodies' centres of mass to one point of each.
+#[inline(always)]
+pub(super) fn arms(head: &HeadLanes, p: &PointLanes) -> [V3; 2] {
+    [p.anchor, p.anchor - head.between]
+}
+
+/// Counts a sub-step's impulses.
+#[inline(always)]
+pub(super) fn count(p: &mut PointLanes) {
+    p.total[0] += p.normal;
+    p.total[1] += p.tangent[0];
+    p.total[2] += p.tangent[1];
 }
 
 /// Gaps at one point of each.
 #[inline(always)]
-pub(super) fn separation(head: &HeadLanes, p: &PointLanes, a: &BodyLanes, b: &BodyLanes) -> f32x4 {
-    let core_a = p.anchor_a - head.round_a * head.normal;
-    let core_b = p.anchor_b - head.round_b * head.normal;
+pub(super) fn separation(head: &HeadLanes, p: &PointLanes, a: &BodyLanes, b: &BodyLanes) -> Lane {
+    let [ra, rb] = arms(head, p);
+    let (core_a, core_b) = (ra - head.round_a * head.normal, rb - head.round_b * head.normal);
     let moved = b.translation - a.translation + b.turned(core_b) - a.turned(core_a);
     p.adjusted_separation + head.normal.dot(moved)
 }
 
 #[inline(always)]
 pub(super) fn push_tangent(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLanes, b: &mut BodyLanes) {
-    let ([t1, t2], ra, rb) = (head.tangents, p.anchor_a, p.anchor_b);
+    let ([t1, t2], [ra, rb]) = (head.tangents, arms(head, p));
     let slide = b.velocity_at(rb) - a.velocity_at(ra);
     let x = p.tangent[0] - p.tangent_mass * t1.dot(slide);
     let y = p.tangent[1] - p.tangent_mass * t2.dot(slide);
     let length = (x * x + y * y).sqrt();
     let most = head.friction * p.normal;
-    let scale = length.simd_gt(most).bitselect(most / length, f32x4::ONE);
+    let scale = length.simd_gt(most).bitselect(most / length, Lane::ONE);
     let (x, y) = (x * scale, y * scale);
     let push = (x - p.tangent[0]) * t1 + (y - p.tangent[1]) * t2;
     let good = push.x.is_finite() & push.y.is_finite() & push.z.is_finite();
@@ -42,17 +56,18 @@ pub(super) fn push_tangent(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLan
 #[inline(always)]
 pub(super) fn bounce(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLanes, b: &mut BodyLanes, step: &StepParams) {
     let (restitution, normal) = (head.restitution, head.normal);
-    let threshold = f32x4::splat(-step.restitution_threshold);
-    let bounces =
-        restitution.simd_gt(f32x4::ZERO) & !p.approach.simd_gt(threshold) & p.max_impulse.simd_gt(f32x4::ZERO);
-    let velocity = normal.dot(b.velocity_at(p.anchor_b) - a.velocity_at(p.anchor_a));
+    let threshold = Lane::splat(-step.restitution_threshold);
+    let bounces = restitution.simd_gt(Lane::ZERO) & !p.approach.simd_gt(threshold) & p.total[0].simd_gt(Lane::ZERO);
+    let [ra, rb] = arms(head, p);
+    let velocity = normal.dot(b.velocity_at(rb) - a.velocity_at(ra));
     let change = -p.normal_mass * (velocity + restitution * p.approach);
     let sum = p.normal + change;
-    let new = sum.fast_max(f32x4::ZERO);
+    let new = sum.fast_max(Lane::ZERO);
     let push = new - p.normal;
     let good = bounces & sum.is_finite();
     p.normal = good.bitselect(new, p.normal);
-    apply(a, b, p.anchor_a, p.anchor_b, (good & push) * normal);
+    p.total[0] += good & push;
+    apply(a, b, ra, rb, (good & push) * normal);
 }
 
 #[inline(always)]

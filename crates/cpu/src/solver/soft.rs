@@ -2,7 +2,7 @@
 //! `shaders/solver/soft.wgsl`.
 
 use super::Visit;
-use super::push::{apply, push_tangent, relative_velocity, separation};
+use super::push::{apply, arms, count, push_tangent, relative_velocity, separation};
 use crate::math::{finite, vec3};
 use glam::Vec3;
 use tumble_core::layout::{ConstraintHead, ConstraintPoint, Impulse, SolverBody, StepParams};
@@ -11,7 +11,7 @@ use tumble_core::layout::{ConstraintHead, ConstraintPoint, Impulse, SolverBody, 
 pub(super) fn visit(
     visit: Visit,
     head: &ConstraintHead,
-    [t1, t2]: [Vec3; 2],
+    tangents: [Vec3; 2],
     points: &mut [ConstraintPoint],
     impulses: &mut [Impulse],
     a: &mut SolverBody,
@@ -21,8 +21,11 @@ pub(super) fn visit(
     for (point, impulse) in points.iter_mut().zip(impulses.iter_mut()) {
         push_normal(visit, head, point, impulse, a, b, step);
     }
-    for (point, impulse) in points.iter().zip(impulses) {
-        push_tangent(head.friction, t1, t2, point, impulse, a, b);
+    for (point, impulse) in points.iter_mut().zip(impulses) {
+        push_tangent(head, tangents, point, impulse, a, b);
+        if visit == Visit::Relax {
+            count(point, impulse);
+        }
     }
 }
 
@@ -37,7 +40,7 @@ fn push_normal(
     step: &StepParams,
 ) {
     let normal = vec3(head.normal);
-    let (ra, rb) = (vec3(point.anchor_a), vec3(point.anchor_b));
+    let [ra, rb] = arms(head, point);
     let velocity = normal.dot(relative_velocity(a, b, ra, rb));
     let separation = separation(head, point, a, b);
     let (bias, mass_scale, impulse_scale) = if separation > 0.0 {
@@ -47,7 +50,7 @@ fn push_normal(
     } else {
         (0.0, 1.0, 0.0)
     };
-    if visit == Visit::Relax && point.max_impulse == 0.0 {
+    if visit == Visit::Relax && point.total[0] == 0.0 && impulse.normal == 0.0 {
         point.approach = point.approach.min(velocity);
     }
     let change = -point.normal_mass * mass_scale * (velocity + bias) - impulse_scale * impulse.normal;
@@ -57,7 +60,6 @@ fn push_normal(
         let new = sum.max(0.0);
         let push = new - impulse.normal;
         impulse.normal = new;
-        point.max_impulse = point.max_impulse.max(new);
         apply(a, b, ra, rb, push * normal);
     }
 }

@@ -16,8 +16,8 @@ use bytemuck::Zeroable;
 use rayon::prelude::*;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{
-    Aabb, BodyState, Collider, Control, FoundManifold, Manifold, Pair, Rest, StepParams, aabb_body, body_flags,
-    edit_op, pair_kind, tree_members,
+    Aabb, BodyState, Collider, Control, FoundManifold, Manifold, Pair, PoseRecord, Rest, StepParams, aabb_body,
+    body_flags, edit_op, pair_kind, tree_members,
 };
 use tumble_core::{MortonBits, Sleep};
 
@@ -96,8 +96,8 @@ impl Waking {
 
 /// What a committed step leaves to be looked at for sleep.
 pub(super) struct Outcome<'a> {
-    /// States at the beginning, as the passes of the step read them.
-    pub(super) states: &'a [BodyState],
+    /// From [`Kept::labels`]; empty where nothing may sleep.
+    pub(super) labels: Vec<u32>,
     pub(super) manifolds: &'a [Manifold],
     pub(super) ends: &'a [Ends],
     pub(super) waking: Waking,
@@ -161,8 +161,8 @@ impl Kept {
 
     /// A step of a world that [is idle](Self::is_idle).
     pub(super) fn pass_time(&mut self, step: &StepParams) {
-        let Control { recolor, free_count, old_pair_count, frozen_count, asleep, islands_asleep, .. } = self.control;
-        self.control = Control { step: step.step, recolor, free_count, old_pair_count, ..Control::zeroed() };
+        let Control { colored_as, free_count, old_pair_count, frozen_count, asleep, islands_asleep, .. } = self.control;
+        self.control = Control { step: step.step, colored_as, free_count, old_pair_count, ..Control::zeroed() };
         self.control = Control { frozen_count, asleep, islands_asleep, ..self.control };
         self.asleep.changed = false;
         self.asleep.sums.add_to(&mut self.control);
@@ -277,10 +277,21 @@ impl Kept {
         if any { self.asleep.rouse(&marked, &self.colliders, states, waking) } else { Vec::new() }
     }
 
+    /// Labels of the step's islands, where bodies may sleep; `states` as the passes of the step read them.
+    pub(super) fn labels(
+        &self,
+        states: &[BodyState],
+        manifolds: &[Manifold],
+        ends: &[Ends],
+        step: &StepParams,
+    ) -> Vec<u32> {
+        may_sleep(step).map_or(Vec::new(), |_| island::label(states, manifolds, ends))
+    }
+
     /// Looks who has rested long enough, and puts whole islands to sleep. `self.states` are those after the step, and
     /// `self.pairs` all that were looked at.
     pub(super) fn settle(&mut self, outcome: Outcome, step: &StepParams, control: &mut Control) {
-        let Outcome { states, manifolds, ends, waking } = outcome;
+        let Outcome { labels, manifolds, ends, waking } = outcome;
         let woken = waking.any();
         let asleep = &mut self.asleep;
         if let Some(still) = waking.still.as_ref() {
@@ -304,12 +315,12 @@ impl Kept {
                 *rest = if anew { sleep::begin(state) } else { sleep::rest(rest, state, props, sleep, step.dt) };
             },
         );
-        let labels = island::label(states, manifolds, ends);
         let busy = self.busy(&labels, manifolds, ends, sleep);
         let mut slept = false;
         for (slot, &label) in labels.iter().enumerate().filter(|(_, label)| **label != NO_ISLAND) {
             if !busy[label as usize] {
                 sleep::put_to_sleep(&mut self.states[slot]);
+                self.poses[slot] = PoseRecord::of(&self.states[slot], &self.props[slot]);
                 self.asleep.rests[slot].island = label;
                 slept = true;
             }

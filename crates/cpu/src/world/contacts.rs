@@ -22,7 +22,7 @@ impl World {
             pairs: &pairs,
             batch_of_slot: &kept.batch_of_slot,
             found: &kept.found,
-            impulses: &kept.impulses,
+            memory: &kept.memory,
         };
         Ok(committed.contacts(&self.editor))
     }

@@ -109,7 +109,7 @@ impl Kept {
         watch: &mut Stopwatch,
     ) -> std::result::Result<Planned, Overflow> {
         let run = watch.begin("edit");
-        let mut control = Control { step: step.step, recolor: self.control.recolor, ..Control::zeroed() };
+        let mut control = Control { step: step.step, colored_as: self.control.colored_as, ..Control::zeroed() };
         let states = self.edit(asked.edits, step);
         let Asked { edits, params, broadphase } = *asked;
         let mut states = self.quarantine(states, &mut control);
@@ -169,12 +169,12 @@ impl Kept {
         let run = watch.next(run, "batch");
         let body_of = |collider: u32| self.colliders[collider as usize].body;
         let ends: Vec<_> = matched.pairs.iter().map(|p| batch::ends(p, &body_of, &states)).collect();
-        let recolor = self.control.recolor != 0;
+        let recolor = self.control.colored_as != step.batching;
         let batches = batch::place(&matched.pairs, &manifolds, &ends, &self.batch_of_slot, recolor, states.len(), step);
         control.rounds = batches.rounds;
         control.batch_count = batches.batch_count;
         control.max_degree = batches.max_degree;
-        control.recolor = u32::from(batch::wasteful(batches.batch_count, batches.max_degree));
+        control.colored_as = batch::colored_as(&batches, step.batching);
         control.batch_start[..batches.start.len()].copy_from_slice(&batches.start);
         control.last_count = batches.order.len() as u32 - batches.start[batches.start.len() - 2];
         control.solved = batches.order.len() as u32;
@@ -220,10 +220,11 @@ impl Kept {
     /// Solves and writes everything that lives past the step.
     pub(super) fn commit(&mut self, planned: Planned, step: &StepParams, restitution: bool, watch: &mut Stopwatch) {
         let run = watch.begin("prepare");
-        let Planned { states, matched, manifolds, batches, mut control, ends, waking } = planned;
+        let Planned { mut states, matched, manifolds, batches, mut control, ends, waking } = planned;
+        let labels = self.labels(&states, &manifolds, &ends, step);
         let mut bodies: Vec<SolverBody> = (0..states.len())
             .into_par_iter()
-            .with_min_len(512)
+            .with_min_len(256)
             .map(|i| prepare::prepare_body(&states[i], &self.props[i], batches.masks[i]))
             .collect();
         self.rows.build(&batches.start, &self.colliders, &bodies, step, |c| {
@@ -239,19 +240,18 @@ impl Kept {
         let run = watch.next(run, "motion");
         contact::commit_free(&mut self.free, &matched);
         self.commit_slots(&states, &matched, &manifolds, &batches);
-        let committed: Vec<_> =
-            bodies.par_iter().zip(&states).with_min_len(512).map(|(b, s)| motion::commit(b, s)).collect();
-        for (slot, (_, bad)) in committed.iter().enumerate() {
-            if *bad {
-                name(&mut control, slot);
-            }
-        }
-        self.states = committed.into_par_iter().with_min_len(512).map(|(state, _)| state).collect();
+        self.poses.resize(states.len(), PoseRecord::zeroed());
+        let moved = bodies.par_iter().zip(&self.props).zip(states.par_iter_mut().zip(&mut self.poses));
+        let bad = moved.enumerate().with_min_len(256).filter_map(|(slot, ((body, props), (state, pose)))| {
+            let (new, bad) = motion::commit(body, state);
+            (*state, *pose) = (new, PoseRecord::of(&new, props));
+            bad.then_some(slot)
+        });
+        bad.collect::<Vec<_>>().into_iter().for_each(|slot| name(&mut control, slot));
+        self.states = states;
         self.pairs = matched.pairs;
-        let outcome = Outcome { states: &states, manifolds: &manifolds, ends: &ends, waking };
+        let outcome = Outcome { labels, manifolds: &manifolds, ends: &ends, waking };
         self.settle(outcome, step, &mut control);
-        let posed = self.states.par_iter().zip(&self.props).with_min_len(512);
-        self.poses = posed.map(|(s, p)| PoseRecord::of(s, p)).collect();
         control.frozen_count = self
             .states
             .iter()
@@ -269,7 +269,7 @@ impl Kept {
         let found = Shared::new(&mut self.found);
         let batch_of_slot = Shared::new(&mut self.batch_of_slot);
         let impulses = Shared::new(bytemuck::cast_slice_mut::<Impulse, [Impulse; 4]>(&mut self.impulses));
-        matched.pairs.par_iter().enumerate().with_min_len(1024).for_each(|(i, pair)| {
+        matched.pairs.par_iter().enumerate().with_min_len(256).for_each(|(i, pair)| {
             let (slot, manifold) = (pair.slot as usize, manifolds[i]);
             let (mut batch, mut own) = (UNBATCHED, [contact::NO_IMPULSE; 4]);
             contact::commit_pair(&manifold, batches.of_pair[i], &mut batch, &mut own);
@@ -286,14 +286,14 @@ impl Kept {
             }
         });
         let memory = Shared::new(&mut self.memory);
-        self.rows.for_each_constraint(|c, remembered, solved| {
+        self.rows.for_each_constraint(|c, solved| {
             let index = batches.order[c] as usize;
             let slot = matched.pairs[index].slot as usize;
-            let stored = std::array::from_fn(|k| store::store(&manifolds[index], k, solved[k].0, solved[k].1));
+            let stored = std::array::from_fn(|k| store::store(&manifolds[index], k, solved));
             // SAFETY: as above; each constraint is one of those pairs.
             unsafe { impulses.set(slot, stored) };
             // SAFETY: as above.
-            unsafe { memory.set(slot, store::store_memory(&manifolds[index], remembered)) };
+            unsafe { memory.set(slot, store::store_memory(&manifolds[index], solved)) };
         });
     }
 }

@@ -24,7 +24,7 @@ use tumble_core::{Editor, Params, Plan, Poses, Result, Scene, StageRun, StageTim
 const IN_FLIGHT: usize = 3;
 /// Batches with a dispatch of their own as long as no report has told how many there are.
 const WIDE_BATCHES: u32 = 24;
-/// Constraints from which on a batch is worth a dispatch; those behind the last such batch share a workgroup.
+/// Constraints from which on a batch is worth a dispatch at first; those behind the last such batch share a workgroup.
 const WIDE: u32 = 256;
 
 /// A simulation on a GPU.
@@ -66,13 +66,15 @@ pub struct World {
     told: Option<[u32; 4]>,
     /// The last step that had edits, or woke all.
     disturbed: u32,
+    /// Constraints from which on a batch is worth one.
+    wide: u32,
+    /// Dispatches that the last submission recorded.
+    dispatches: u32,
     /// How far colliders lay apart in the step of this number.
     extent: Option<(u32, Vec3)>,
     device_runs: Vec<StageRun>,
     watch: Stopwatch,
     growths: Vec<(&'static str, u32)>,
-    /// Of the last step that was submitted.
-    dispatches: u32,
     drop_pair: u32,
     /// From the first query on.
     query: Option<Query>,
@@ -152,11 +154,12 @@ impl World {
             known: VecDeque::new(),
             told: None,
             disturbed: 0,
+            wide: WIDE,
+            dispatches: 0,
             extent: None,
             device_runs: Vec::new(),
             watch: Stopwatch::default(),
             growths: Vec::new(),
-            dispatches: 0,
             drop_pair: u32::MAX,
             built,
             query: None,
@@ -215,12 +218,6 @@ impl World {
         Ok((self.buffers.buffer("poses")?, self.buffers.generation_of("poses")))
     }
 
-    /// For benches: dispatches of the last step that was submitted.
-    #[doc(hidden)]
-    pub fn dispatches(&self) -> u32 {
-        self.dispatches
-    }
-
     /// Test hook: colliders of the pairs of the last step, once it has run.
     #[doc(hidden)]
     pub fn pairs(&mut self) -> Result<Vec<[u32; 2]>> {
@@ -237,6 +234,19 @@ impl World {
     #[doc(hidden)]
     pub fn drop_pair(&mut self, index: u32) {
         self.drop_pair = index;
+    }
+
+    /// For benches: batches of fewer constraints share one dispatch, if no larger one comes behind them. Results do not
+    /// change.
+    #[doc(hidden)]
+    pub fn fuse_below(&mut self, constraints: u32) {
+        self.wide = constraints;
+    }
+
+    /// For benches: dispatches that the last step recorded.
+    #[doc(hidden)]
+    pub fn dispatches(&self) -> u32 {
+        self.dispatches
     }
 
     /// Submits one step. Waits only when three are in flight.
@@ -341,8 +351,8 @@ impl World {
             true => self.stages.record_idle(&mut recorder)?,
             false => self.stages.record(&mut recorder, &self.buffers, &record.step)?,
         }
-        self.dispatches = recorder.dispatches();
         self.statuses.copy(recorder.encoder(), self.buffers.buffer("control")?, 0);
+        self.dispatches = recorder.dispatches();
         let run = self.watch.next(run, "submit");
         let index = recorder.submit()?;
         self.watch.end(run);
@@ -385,7 +395,7 @@ impl World {
                     self.stages.broadphase.walked(record.step.step, status.turns);
                 }
                 let awake = if record.step.sleep_distance >= 0.0 { status.awake } else { u32::MAX };
-                self.known.push_back((record.step.step, wide_batches(&status), awake));
+                self.known.push_back((record.step.step, wide_batches(&status, self.wide), awake));
                 self.last_step = record.step;
                 self.most_pairs = self.most_pairs.max(status.old_pair_count);
                 if self.known.len() > 2 * IN_FLIGHT {
@@ -411,10 +421,10 @@ fn with_sleep(plan: Plan, params: &Params) -> Plan {
 }
 
 /// How many of the first batches have a dispatch of their own: up to the last that is worth one.
-fn wide_batches(status: &Control) -> u32 {
+fn wide_batches(status: &Control, wide: u32) -> u32 {
     let worth = |batch: &u32| {
         let first = *batch as usize;
-        status.batch_start[first + 1].saturating_sub(status.batch_start[first]) >= WIDE
+        status.batch_start[first + 1].saturating_sub(status.batch_start[first]) >= wide
     };
     (0..LAST_BATCH).rev().find(worth).map_or(0, |batch| batch + 1)
 }

@@ -4,7 +4,7 @@ use super::{World, pose_bytes, read_control};
 use crate::readback::{read_now, read_parts};
 use bytemuck::pod_collect_to_vec;
 use tumble_core::contacts::{Committed, Contacts};
-use tumble_core::layout::{BodyState, Collider, FoundManifold, Impulse, Pair, PoseRecord};
+use tumble_core::layout::{BodyState, Collider, FoundManifold, ManifoldMemory, Pair, PoseRecord};
 use tumble_core::{Error, Poses, Result, Velocities};
 
 impl World {
@@ -89,11 +89,11 @@ impl World {
                 part("pairs", pairs, size_of::<Pair>())?,
                 part("batch_of_slot", slots, 4)?,
                 part("found_manifolds", slots, size_of::<FoundManifold>())?,
-                part("slot_impulses", slots, 4 * size_of::<Impulse>())?,
+                part("slot_memory", slots, size_of::<ManifoldMemory>())?,
             ],
         )?;
         self.watch.end(run);
-        let [states, colliders, pairs, batch_of_slot, found, impulses] = &bytes;
+        let [states, colliders, pairs, batch_of_slot, found, memory] = &bytes;
         let committed = Committed {
             step: &self.last_step,
             states: &pod_collect_to_vec::<u8, BodyState>(states),
@@ -101,7 +101,7 @@ impl World {
             pairs: &pod_collect_to_vec::<u8, Pair>(pairs),
             batch_of_slot: &pod_collect_to_vec::<u8, u32>(batch_of_slot),
             found: &pod_collect_to_vec::<u8, FoundManifold>(found),
-            impulses: &pod_collect_to_vec::<u8, Impulse>(impulses),
+            memory: &pod_collect_to_vec::<u8, ManifoldMemory>(memory),
         };
         Ok(committed.contacts(&self.editor))
     }

@@ -1,0 +1,139 @@
+//! The passes of a step over rows in groups of four, by all threads inside one parallel section.
+//!
+//! A sweep is a stage a batch, since batches may share bodies. Batches too small to be cut lie one behind the other and
+//! are worked off as one block: handing each to the next thread costs more than it gives.
+
+use super::lanes::{BodyLanes, ConstraintLanes};
+use super::{Bodies, Pass, Rows, Visit, one_pass_lanes, soft_lanes};
+use crate::shared::Shared;
+use crate::workers::{block_of, blocks, run_stages};
+use std::ops::Range;
+use std::sync::Mutex;
+use tumble_core::layout::{LAST_BATCH, StepParams};
+use wide::f32x4;
+
+/// Fewest groups of a block.
+const GROUPS: usize = 8;
+/// Fewest bodies of a block.
+const BODIES: usize = 128;
+
+/// Groups that are worked off together: of one batch, or of several and then in one block.
+struct Part {
+    groups: Range<usize>,
+    blocks: u32,
+    /// The last batch comes behind.
+    last: bool,
+}
+
+/// The stages of one sweep.
+fn parts(rows: &Rows) -> Vec<Part> {
+    let mut parts: Vec<Part> = Vec::new();
+    for batch in 0..LAST_BATCH as usize {
+        let groups = rows.group_start[batch]..rows.group_start[batch + 1];
+        if groups.is_empty() {
+            continue;
+        }
+        let count = blocks(groups.len(), GROUPS);
+        match parts.last_mut() {
+            Some(part) if part.blocks == 1 && count == 1 => part.groups.end = groups.end,
+            _ => parts.push(Part { groups, blocks: count, last: false }),
+        }
+    }
+    if !rows.last.heads.is_empty() {
+        match parts.last_mut() {
+            Some(part) if part.blocks == 1 => part.last = true,
+            _ => parts.push(Part { groups: 0..0, blocks: 1, last: true }),
+        }
+    }
+    parts
+}
+
+/// Runs the passes.
+pub(super) fn run(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, passes: &[Pass]) {
+    let parts = parts(rows);
+    let Bodies { solver, states, props } = bodies;
+    let all = 0..solver.len();
+    let mut stages: Vec<(Pass, Option<&Part>)> = Vec::new();
+    for &pass in passes {
+        match pass {
+            Pass::Bodies(_) => stages.push((pass, None)),
+            Pass::Sweep(_) => stages.extend(parts.iter().map(|part| (pass, Some(part)))),
+        }
+    }
+    let body_blocks = blocks(all.len(), BODIES);
+    let counts: Vec<u32> = stages.iter().map(|(_, part)| part.map_or(body_blocks, |part| part.blocks)).collect();
+    let groups = Shared::new(&mut rows.groups);
+    let last = Mutex::new(&mut rows.last);
+    let bodies = Shared::new(solver);
+    run_stages(&counts, |stage, block| match stages[stage] {
+        (Pass::Bodies(each), _) => {
+            for i in block_of(&all, block, body_blocks) {
+                // SAFETY: blocks of a stage share no body.
+                let body = unsafe { &mut bodies.slice_mut(i..i + 1)[0] };
+                each(body, &states[i], &props[i], step);
+            }
+        }
+        (Pass::Sweep(visit), Some(part)) => {
+            let range = block_of(&part.groups, block, part.blocks);
+            // SAFETY: blocks of a stage share no group.
+            sweep(unsafe { groups.slice_mut(range) }, &bodies.rows(), step, visit);
+            if part.last {
+                // SAFETY: a part with the last batch has this block alone.
+                let bodies = unsafe { bodies.slice_mut(all.clone()) };
+                last.lock().expect("no other thread had it").sweep(bodies, step, visit);
+            }
+        }
+        (Pass::Sweep(_), None) => unreachable!("a sweep is over parts"),
+    });
+}
+
+/// One visit to each group, in order. The groups of one batch share no moving body (`batch`), so threads may have some
+/// each.
+fn sweep(groups: &mut [ConstraintLanes], bodies: &Shared<'_, f32x4>, step: &StepParams, visit: Visit) {
+    // The visit is a constant in each of these loops.
+    match visit {
+        Visit::WarmStart => groups.iter_mut().for_each(|group| visit_group(Visit::WarmStart, group, bodies, step)),
+        Visit::Solve => groups.iter_mut().for_each(|group| visit_group(Visit::Solve, group, bodies, step)),
+        Visit::Relax => groups.iter_mut().for_each(|group| visit_group(Visit::Relax, group, bodies, step)),
+        Visit::Load => groups.iter_mut().for_each(|group| visit_group(Visit::Load, group, bodies, step)),
+        Visit::Pass => groups.iter_mut().for_each(|group| visit_group(Visit::Pass, group, bodies, step)),
+        Visit::Restitution => groups.iter_mut().for_each(|group| visit_group(Visit::Restitution, group, bodies, step)),
+    }
+}
+
+#[inline(always)]
+fn visit_group(visit: Visit, group: &mut ConstraintLanes, bodies: &Shared<'_, f32x4>, step: &StepParams) {
+    let moved = !matches!(visit, Visit::WarmStart | Visit::Restitution);
+    // SAFETY: no other thread moves these bodies meanwhile: constraints of one batch share none that moves, a part of
+    // several batches is one block, and bodies that do not move are never written (`scatter`).
+    let read = |i: usize| unsafe { bodies.get(i) };
+    let (ia, ib) = (group.head.body_a, group.head.body_b);
+    let mut a = BodyLanes::gather(read, ia, moved);
+    let mut b = BodyLanes::gather(read, ib, moved);
+    match visit {
+        Visit::WarmStart => group.warm_start(&mut a, &mut b),
+        Visit::Solve | Visit::Relax => soft_lanes::visit(visit, group, &mut a, &mut b, step),
+        Visit::Load => {
+            let [more_a, more_b] = one_pass_lanes::load(group, &mut a, &mut b);
+            // SAFETY: as above.
+            unsafe { a.weigh(bodies, ia, more_a) };
+            // SAFETY: as above.
+            unsafe { b.weigh(bodies, ib, more_b) };
+        }
+        Visit::Pass => {
+            let blows = one_pass_lanes::pass(group, &mut a, &mut b, step);
+            for (point, push) in blows.into_iter().enumerate().filter_map(|(k, push)| Some((k, push?))) {
+                let [ra, rb] = group.arms(point);
+                // SAFETY: as above.
+                unsafe { a.start_after(bodies, ia, -1.0, ra, push) };
+                // SAFETY: as above.
+                unsafe { b.start_after(bodies, ib, 1.0, rb, push) };
+            }
+        }
+        Visit::Restitution => group.bounce(&mut a, &mut b, step),
+    }
+    // SAFETY: as above.
+    unsafe { a.scatter(bodies, ia) };
+    // SAFETY: as above.
+    unsafe { b.scatter(bodies, ib) };
+}
