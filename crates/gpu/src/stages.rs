@@ -83,7 +83,7 @@ impl Stages {
 
         self.solver.record(recorder, buffers, step)?;
         self.contact.record_commit(recorder, buffers)?;
-        self.motion.record_commit(recorder, step)?;
+        self.motion.record_commit(recorder, buffers, step)?;
         if let Some(sleep) = self.sleep.as_ref().filter(|_| may_sleep) {
             sleep.record_settle(recorder, step)?;
         }
