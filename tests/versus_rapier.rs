@@ -1,10 +1,9 @@
 //! Whole scenes beside rapier 0.36, same dt, sub-steps, friction and shapes, sleep off, in one run. Oracle: rapier.
 //!
-//! The rule of each row: no worse than rapier by more than 10 % or 0.1 mm. Heaps are chaotic, and the deepest of some
-//! 500 overlaps swings by half its size from seed to seed in either engine (rapier, pile of 200 boxes, 40 seeds: 4.4 to
-//! 10.8 mm), so medians are over 40 seeds; the GPU, slow here, runs five and is held to the mean overlap by the rule, and
-//! to rapier's upper quartile in the deepest. On seeds 1 to 5 alone the CPU fails two rows (docs/solver.md says by how
-//! much). See the rows with
+//! The rule of each row: no worse than rapier by more than 10 % or 0.1 mm, and better by what this solver is there for: a
+//! column's and a pyramid's deepest overlap at most a tenth of rapier's; a heap's mean at most an eighth and its deepest at
+//! most a half (heaps are chaotic: medians of five seeds). Measured: columns 1/280 to 1/1,100, pyramid 1/22, heaps' means
+//! 1/11 to 1/58, their deepest 1/2.2 to 1/50. See the rows with
 //! `cargo test --release --test versus_rapier -- --nocapture --test-threads 1`.
 
 mod common;
@@ -15,9 +14,7 @@ use tumble_bench::engines::RapierWorld;
 use tumble_core::{measures, scenes};
 
 /// Seeds of the chaotic scenes.
-const SEEDS: u64 = 40;
-/// Those that the GPU runs.
-const GPU_SEEDS: usize = 5;
+const SEEDS: u64 = 5;
 
 /// What is left of a scene when it should be at rest.
 #[derive(Debug, Clone, Copy)]
@@ -108,14 +105,14 @@ fn compare(case: &str, scenes: &[Scene], steps: usize, energy_floor: f64) {
     let rapier = rests(Side::Rapier);
     let theirs = quantiles(&rapier, 0.5);
     println!("{case:<14} rapier {theirs:.4?}");
-    let on_gpu: Vec<_> = scenes.iter().take(GPU_SEEDS).map(|s| run(s, steps, Side::Gpu)).collect();
+    let on_gpu: Vec<_> = scenes.iter().map(|s| run(s, steps, Side::Gpu)).collect();
     for (name, ours) in [("cpu", quantiles(&rests(Side::Cpu), 0.5)), ("gpu", quantiles(&on_gpu, 0.5))] {
         println!("{case:<14} {name:<6} {ours:.4?}");
         let worse = |ours: f64, theirs: f64, floor: f64| ours > (theirs * 1.1).max(theirs + floor);
-        let few = chaotic && name == "gpu";
-        let deepest = if few { quantiles(&rapier, 0.75).deepest } else { theirs.deepest };
-        assert!(!worse(ours.deepest, deepest, 0.1), "{case} {name}: deepest {} for {deepest} mm", ours.deepest);
-        assert!(!worse(ours.mean, theirs.mean, 0.1), "{case} {name}: mean {} for {} mm", ours.mean, theirs.mean);
+        let (deepest, mean) = if chaotic { (0.5, 0.125) } else { (0.1, 0.1) };
+        let (deepest, mean) = (deepest * theirs.deepest, mean * theirs.mean);
+        assert!(ours.deepest <= deepest, "{case} {name}: deepest {}, more than {deepest} mm", ours.deepest);
+        assert!(ours.mean <= mean, "{case} {name}: mean {}, more than {mean} mm", ours.mean);
         let energy = theirs.energy.max(energy_floor);
         assert!(!worse(ours.energy, energy, 0.0), "{case} {name}: energy {} for {energy} mJ/kg", ours.energy);
         if !chaotic {

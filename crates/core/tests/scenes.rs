@@ -61,6 +61,7 @@ fn stacks_touch_exactly() {
         (scenes::many_pyramids(9, 10), "many pyramids"),
         (scenes::large_on_small(), "large on small"),
         (scenes::hub(500), "hub"),
+        (scenes::ball_column(30), "ball column"),
     ] {
         let poses = initial_poses(&scene);
         assert_eq!(penetration(&scene, &poses).max_m, 0.0, "{name}");
@@ -73,6 +74,17 @@ fn stacks_touch_exactly() {
 fn structures_have_the_bodies_and_masses_they_say() {
     assert_eq!(dynamic(&scenes::many_pyramids(196, 10)), 10_780);
     assert_eq!(dynamic(&scenes::wide_pyramid(15)), 1240);
+    let structures = [
+        (scenes::card_house(5), 40),
+        (scenes::jenga(30), 90),
+        (scenes::dominoes(30), 30),
+        (scenes::plank_tower(40), 80),
+    ];
+    for (scene, bodies) in structures.into_iter().chain([(scenes::tiny_pyramid(10), 55)]) {
+        assert_eq!(dynamic(&scene), bodies);
+        // To the last bits of leaning cards and touching dominoes.
+        assert!(penetration(&scene, &initial_poses(&scene)).max_m < 2e-6, "{bodies}");
+    }
     let masses = |scene: &Scene| {
         let all: Vec<_> = scene.bodies().map(|b| scene.mass_properties(b).unwrap().mass).filter(|&m| m > 0.0).collect();
         all.iter().fold(0.0, |most: f32, &m| most.max(m)) / all.iter().fold(f32::MAX, |least, &m| least.min(m))

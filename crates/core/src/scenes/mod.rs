@@ -9,6 +9,7 @@ mod heaps;
 mod motion;
 mod random;
 mod stacks;
+mod structures;
 
 pub use crowds::{Crowd, crowd};
 pub use heaps::{balls, balls_seeded, mixed, mixed_seeded, pile, pile_seeded};
@@ -16,6 +17,8 @@ pub use motion::{bouncing_ball, bullet, closed_system, cradle, free_box, free_fa
 pub use stacks::{
     column, hub, large_on_small, many_pyramids, mass_ratio, overlap_cube, pyramid, topped_pyramid, wide_pyramid,
 };
+
+pub use structures::{ball_column, card_house, dominoes, jenga, plank_tower, tiny_pyramid};
 
 use crate::builder::{ColliderBuilder, RigidBodyBuilder};
 use crate::handle::BodyHandle;
