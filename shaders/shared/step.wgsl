@@ -9,6 +9,9 @@ const BATCHING_STATIC_LAST: u32 = 4u;
 
 const SOLVER_ONE_PASS: u32 = 0u;
 const SOLVER_SOFT: u32 = 1u;
+const SOLVER_GAUSS_SEIDEL: u32 = 2u;
+const SOLVER_JACOBI: u32 = 3u;
+const SOLVER_PENALTY: u32 = 4u;
 
 struct StepParams {
     dt: f32,
@@ -43,6 +46,6 @@ struct StepParams {
     blow_speed: f32,
     solver: u32,
     batching: u32,
-    pad_a: u32,
-    pad_b: u32,
+    iterations: u32,
+    slop: f32,
 }

@@ -6,6 +6,12 @@ pub mod solver {
     pub const ONE_PASS: u32 = 0;
     /// Soft sub-stepping.
     pub const SOFT: u32 = 1;
+    /// Projected Gauss-Seidel.
+    pub const GAUSS_SEIDEL: u32 = 2;
+    /// Jacobi with mass splitting.
+    pub const JACOBI: u32 = 3;
+    /// Springs and dampers, explicit.
+    pub const PENALTY: u32 = 4;
 }
 
 /// What one step is told, as a uniform. 144 bytes.
@@ -76,10 +82,10 @@ pub struct StepParams {
     pub solver: u32,
     /// How constraints are put into batches, see [`batching`].
     pub batching: u32,
-    /// Unused.
-    pub pad_a: u32,
-    /// Unused.
-    pub pad_b: u32,
+    /// Gauss-Seidel and Jacobi: visits to every contact in a sub-step.
+    pub iterations: u32,
+    /// The same: overlap left alone, m.
+    pub slop: f32,
 }
 
 /// Words of [`StepParams::batching`]: a law, and flags.
