@@ -17,18 +17,19 @@ struct Within {
     depth: f64,
     /// Speed of that box, mm/s.
     speed: f64,
-    /// Error of the way in which a sliding box stops, share of it.
+    /// Error of the way in which a sliding box stops, share of it. The box is slowed once before it first moves, so all
+    /// stop half a sub-step's way short: 0.14 %.
     way: f64,
 }
 
 fn solvers() -> [Within; 5] {
     let of = |solver, depth, speed, way| Within { solver, depth, speed, way };
     [
-        of(Solver::OnePass(OnePass::default()), 0.0, 0.0, 0.0),
-        of(Solver::Soft(Soft::default()), 0.0, 0.0, 0.0),
-        of(Solver::GaussSeidel(GaussSeidel::default()), 0.0, 0.0, 0.0),
-        of(Solver::Jacobi(Jacobi::default()), 0.0, 0.0, 0.0),
-        of(Solver::Penalty(Penalty::default()), 0.0, 0.0, 0.0),
+        of(Solver::OnePass(OnePass::default()), 0.001, 0.005, 0.002),
+        of(Solver::Soft(Soft::default()), 0.03, 0.001, 0.002),
+        of(Solver::GaussSeidel(GaussSeidel::default()), 0.001, 0.001, 0.002),
+        of(Solver::Jacobi(Jacobi::default()), 0.001, 0.001, 0.002),
+        of(Solver::Penalty(Penalty::default()), 0.3, 0.001, 0.002),
     ]
 }
 
@@ -43,6 +44,13 @@ fn a_box_rests_on_the_floor() {
             let fastest = world.velocities().unwrap().iter().map(|v| v.linear.length()).fold(0.0, f32::max) * 1e3;
             println!("rest, {solver} on {side:?}: {deepest:.4} mm, {fastest:.4} mm/s");
             assert!(deepest <= depth, "{solver} on {side:?}: {deepest} mm deep");
+            if let Solver::Penalty(Penalty { stiffness_share, damping_ratio }) = solver {
+                // Spring and damper bear the weight, the damper by the speed that gravity gives in a sub-step.
+                let (share, h) = (f64::from(stiffness_share), 1.0 / 480.0);
+                let damper = 2.0 * f64::from(damping_ratio) * share.sqrt();
+                let exact = 9.81e3 * h * h * (1.0 - damper) / share;
+                assert!((deepest / exact - 1.0).abs() < 0.01, "on {side:?}: {deepest} mm for {exact} mm");
+            }
             assert!(f64::from(fastest) <= speed, "{solver} on {side:?}: {fastest} mm/s");
         }
     }
@@ -86,8 +94,10 @@ fn collisions_keep_momentum() {
             let angular = (measures::angular_momentum(&scene, &poses, &velocities) - spin).length() / mass;
             println!("momentum, {solver} on {side:?}: {off:.2e} m/s, {angular:.2e} m²/s");
             assert!(met, "nothing met");
-            assert!(off <= 0.0, "{solver} on {side:?}: off by {off} m/s");
-            assert!(angular <= 0.0, "{solver} on {side:?}: off by {angular} m²/s");
+            // Rounding: 4e-7 at most. Spin: points of contact stay where they were found for a step, while bodies move;
+            // 1.6e-3 to 1.9e-3 for all.
+            assert!(off <= 2e-6, "{solver} on {side:?}: off by {off} m/s");
+            assert!(angular <= 4e-3, "{solver} on {side:?}: off by {angular} m²/s");
         }
     }
 }

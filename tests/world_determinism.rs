@@ -151,7 +151,7 @@ fn four_at_a_time() {
     let solvers = [
         Solver::OnePass(OnePass::default()),
         Solver::Soft(Soft::default()),
-        Solver::GaussSeidel(GaussSeidel { slop: 1e-3, ..GaussSeidel::default() }),
+        Solver::GaussSeidel(GaussSeidel::default()),
         Solver::Jacobi(Jacobi::default()),
         Solver::Penalty(Penalty::default()),
     ];

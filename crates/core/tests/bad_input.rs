@@ -195,7 +195,7 @@ fn params() {
     }
     cases.push((Params { dt: 0.0, ..good }, "dt"));
     for bad in [0, 257] {
-        let [gauss_seidel, jacobi] = [GaussSeidel::default(), Jacobi::default()];
+        let (gauss_seidel, jacobi) = (GaussSeidel::default(), Jacobi::default());
         cases.extend([
             (by(Solver::GaussSeidel(GaussSeidel { iterations: bad, ..gauss_seidel })), "solver.iterations"),
             (by(Solver::Jacobi(Jacobi { iterations: bad, ..jacobi })), "solver.iterations"),
