@@ -1,8 +1,9 @@
 // The sweeps over constraints of the solvers that are there for comparison; the laws of a visit are in
-// `solver/gauss_seidel`, `solver/jacobi` and `solver/penalty`. Twin of crates/cpu/src/solver/mod.rs (`PlainRows::sweep`).
+// `solver/gauss_seidel`, `solver/jacobi` and `solver/penalty`. Twin of crates/cpu/src/solver/mod.rs
+// (`PlainRows::sweep`).
 //
-// Reads `heads`, and reads and writes `points`, `impulses` and `solver_bodies`: Gauss-Seidel their velocities, Jacobi and
-// penalty the sums in `linear_start` and `angular_start`, so that no constraint sees what others did.
+// Reads `heads`, and reads and writes `points`, `impulses` and `solver_bodies`: Gauss-Seidel their velocities, Jacobi
+// and penalty the sums in `linear_start` and `angular_start`, so that no constraint sees what others did.
 //
 //   gauss_seidel, split, jacobi, penalty
 //              one batch a dispatch (`batch`), one thread a constraint; `last_...` also counts the sub-step's impulses

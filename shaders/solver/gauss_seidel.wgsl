@@ -1,5 +1,5 @@
-// Projected Gauss-Seidel with Baumgarte stabilisation: rigid contacts. Twin of crates/cpu/src/solver/gauss_seidel.rs. No
-// pass, no binding.
+// Projected Gauss-Seidel with Baumgarte stabilisation: rigid contacts. Twin of crates/cpu/src/solver/gauss_seidel.rs.
+// No pass, no binding.
 //
 // Catto, "Iterative Dynamics with Temporal Coherence" (GDC 2005).
 

@@ -1,5 +1,5 @@
-// The penalty method: a spring and a damper at each point that overlaps, pushing with what the sub-step began with. Twin
-// of crates/cpu/src/solver/penalty.rs. No pass, no binding.
+// The penalty method: a spring and a damper at each point that overlaps, pushing with what the sub-step began with.
+// Twin of crates/cpu/src/solver/penalty.rs. No pass, no binding.
 //
 // Harada, "Real-Time Rigid Body Simulation on GPUs" (GPU Gems 3, chapter 29).
 

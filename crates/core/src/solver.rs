@@ -78,14 +78,14 @@ impl Default for Soft {
     }
 }
 
-/// Projected Gauss-Seidel on velocities: each sub-step integrates velocities, applies the impulses of the last sub-step,
-/// visits every contact `iterations` times, and integrates positions (Catto, "Iterative Dynamics with Temporal
-/// Coherence", GDC 2005; "Fast and Simple Physics using Sequential Impulses", GDC 2006). Overlap is undone by a velocity
-/// that the contacts are given beside (Baumgarte, 1972), which stays in the bodies as energy.
+/// Projected Gauss-Seidel on velocities: each sub-step integrates velocities, applies the impulses of the last
+/// sub-step, visits every contact `iterations` times, and integrates positions (Catto, "Iterative Dynamics with
+/// Temporal Coherence", GDC 2005; "Fast and Simple Physics using Sequential Impulses", GDC 2006). Overlap is undone by
+/// a velocity that the contacts are given beside (Baumgarte, 1972), which stays in the bodies as energy.
 ///
-/// Iterations and share are Bullet's, which runs them once a step: that is `Params::substeps` 1. Bad, then, at tall stacks
-/// and large ratios of mass, where the iterations end long before the load has passed all contacts: a column of 20 falls.
-/// With sub-steps it is accurate, at many times the cost of the others.
+/// Iterations and share are Bullet's, which runs them once a step: that is `Params::substeps` 1. Bad, then, at tall
+/// stacks and large ratios of mass, where the iterations end long before the load has passed all contacts: a column of
+/// 20 falls. With sub-steps it is accurate, at many times the cost of the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaussSeidel {
     /// Visits to every contact in a sub-step. 10 at first.
@@ -104,13 +104,13 @@ impl Default for GaussSeidel {
 
 /// Jacobi iterations: all contacts see the velocities that the iteration began with. Each body is split into as many
 /// parts as it has contacts, one for each to push, and takes the mean of their velocities (Tonge, Benevolenski and
-/// Voroshilov, "Mass Splitting for Jitter-Free Parallel Rigid Body Simulation", SIGGRAPH 2012). Points of one contact are
-/// visited in turn. Everything else is as in [`GaussSeidel`].
+/// Voroshilov, "Mass Splitting for Jitter-Free Parallel Rigid Body Simulation", SIGGRAPH 2012). Points of one contact
+/// are visited in turn. Everything else is as in [`GaussSeidel`].
 ///
-/// It shows Jacobi's result, not its speed: velocities are summed batch by batch, so that they are the same bits for any
-/// number of threads, and so it pays for batches that it could do without. Bad at all that [`GaussSeidel`] is bad at, and
-/// more so: a push is shared among the parts, and passes one contact an iteration. A box under one of 100
-/// times its mass is thrown out.
+/// It shows Jacobi's result, not its speed: velocities are summed batch by batch, so that they are the same bits for
+/// any number of threads, and so it pays for batches that it could do without. Bad at all that [`GaussSeidel`] is bad
+/// at, and more so: a push is shared among the parts, and passes one contact an iteration. A box under one of 100 times
+/// its mass is thrown out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jacobi {
     /// Visits to every contact in a sub-step. 10 at first.
@@ -128,20 +128,20 @@ impl Default for Jacobi {
     }
 }
 
-/// The penalty method: where surfaces overlap, a spring and a damper push with what the sub-step began with, all contacts
-/// at once (Harada, "Real-Time Rigid Body Simulation on GPUs", GPU Gems 3, chapter 29). Friction is viscous, within
-/// Coulomb's cone. Nothing is remembered; batches only order the sums.
+/// The penalty method: where surfaces overlap, a spring and a damper push with what the sub-step began with, all
+/// contacts at once (Harada, "Real-Time Rigid Body Simulation on GPUs", GPU Gems 3, chapter 29). Friction is viscous,
+/// within Coulomb's cone. Nothing is remembered; batches only order the sums.
 ///
-/// Bad at loads: a point gives way by load h² / (stiffness_share mass), mass being what the point sees and h the sub-step.
-/// Friction creeps, a blow lasts some sub-steps, a pile does not come to rest, and overlap that a scene begins with comes
-/// back as speed: `Params::max_push_speed` does not bound it.
+/// Bad at loads: a point gives way by load h² / (stiffness_share mass), mass being what the point sees and h the
+/// sub-step. Friction creeps, a blow lasts some sub-steps, a pile does not come to rest, and overlap that a scene
+/// begins with comes back as speed: `Params::max_push_speed` does not bound it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Penalty {
     /// Spring constant of a point times h² over the mass that it sees. 0.1 at first.
     pub stiffness_share: f32,
     /// Damping ratio of a point by itself. 0.5 at first, and no more than (1 - stiffness_share) / (4
-    /// sqrt(stiffness_share)). One point alone is stable up to four times that share and damping together; the rest is for
-    /// bodies with several.
+    /// sqrt(stiffness_share)). One point alone is stable up to four times that share and damping together; the rest is
+    /// for bodies with several.
     pub damping_ratio: f32,
 }
 
@@ -264,8 +264,8 @@ impl Solver {
     }
 }
 
-/// A damped spring of angular frequency w = 2 pi f, `frequency` being f h, and of damping ratio z, integrated implicitly
-/// over `h` (Catto, "Soft Constraints", GDC 2011; "Solver2D", 2024).
+/// A damped spring of angular frequency w = 2 pi f, `frequency` being f h, and of damping ratio z, integrated
+/// implicitly over `h` (Catto, "Soft Constraints", GDC 2011; "Solver2D", 2024).
 fn spring(frequency: f32, damping_ratio: f32, h: f32) -> Spring {
     let hw = std::f32::consts::TAU * frequency;
     let a1 = 2.0 * damping_ratio + hw;

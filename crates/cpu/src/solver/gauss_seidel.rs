@@ -1,5 +1,5 @@
-//! Projected Gauss-Seidel with Baumgarte stabilisation: rigid contacts, visited in turn and many times a sub-step. Twin of
-//! `shaders/solver/gauss_seidel.wgsl`.
+//! Projected Gauss-Seidel with Baumgarte stabilisation: rigid contacts, visited in turn and many times a sub-step. Twin
+//! of `shaders/solver/gauss_seidel.wgsl`.
 
 use super::push::{apply, arms, count, push_tangent, relative_velocity, separation};
 use crate::math::{finite, vec3};
@@ -14,8 +14,7 @@ pub(super) fn visit(
     tangents: [Vec3; 2],
     points: &mut [ConstraintPoint],
     impulses: &mut [Impulse],
-    a: &mut SolverBody,
-    b: &mut SolverBody,
+    [a, b]: [&mut SolverBody; 2],
     step: &StepParams,
 ) {
     for (point, impulse) in points.iter_mut().zip(impulses.iter_mut()) {

@@ -1,4 +1,5 @@
-//! The law of `gauss_seidel`, several constraints at a time: the same operations in the same order, so the same results.
+//! The law of `gauss_seidel`, several constraints at a time: the same operations in the same order, so the same
+//! results.
 
 use super::lanes::{BodyLanes, ConstraintLanes, HeadLanes, Lane, PointLanes};
 use super::push_lanes::{apply, arms, count, push_tangent, separation};

@@ -1,8 +1,8 @@
 //! Jacobi iterations with mass splitting. Twin of `shaders/solver/jacobi.wgsl`.
 //!
-//! A body of n contacts is split into n parts of mass / n, one for each contact to push; after the iteration the body has
-//! the mean of their velocities. So every contact sees the velocities that the iteration began with, and what it does is
-//! summed in `linear_start` and `angular_start`: batch by batch, hence in an order that no thread decides.
+//! A body of n contacts is split into n parts of mass / n, one for each contact to push; after the iteration the body
+//! has the mean of their velocities. So every contact sees the velocities that the iteration began with, and what it
+//! does is summed in `linear_start` and `angular_start`: batch by batch, hence in an order that no thread decides.
 
 use super::gauss_seidel::push_normal;
 use super::push::{arms, count, push_tangent};
@@ -35,8 +35,7 @@ pub(super) fn visit(
     tangents: [Vec3; 2],
     points: &mut [ConstraintPoint],
     impulses: &mut [Impulse],
-    a: &mut SolverBody,
-    b: &mut SolverBody,
+    [a, b]: [&mut SolverBody; 2],
     step: &StepParams,
 ) {
     let (mut part_a, mut part_b) = (part(a), part(b));

@@ -1,6 +1,6 @@
 //! Stage `solver`: rows (`prepare`), the laws of a visit (`one_pass`, `soft`, `gauss_seidel`, `jacobi` and `penalty`, on
-//! `push`; four constraints at a time in those called `_lanes`), the passes over batches (`passes`; in plain form here), and the way back to the store (`store`). Twin of
-//! `shaders/solver/`.
+//! `push`; several constraints at a time in those called `_lanes`), the passes over batches (`passes`; in plain form
+//! here), and the way back to the store (`store`). Twin of `shaders/solver/`.
 //!
 //! Contacts are found once a step and solved in sub-steps (Macklin et al., "Small Steps in Physics Simulation", SCA
 //! 2019), by one of these:
@@ -211,12 +211,12 @@ impl PlainRows {
                 Visit::Pass => one_pass::pass(head, tangents, points, impulses, &mut a, &mut b, step),
                 Visit::GaussSeidel | Visit::LastGaussSeidel => {
                     let last = visit == Visit::LastGaussSeidel;
-                    gauss_seidel::visit(last, head, tangents, points, impulses, &mut a, &mut b, step);
+                    gauss_seidel::visit(last, head, tangents, points, impulses, [&mut a, &mut b], step);
                 }
                 Visit::Split => jacobi::split(&mut a, &mut b),
                 Visit::Jacobi | Visit::LastJacobi => {
                     let last = visit == Visit::LastJacobi;
-                    jacobi::visit(last, head, tangents, points, impulses, &mut a, &mut b, step);
+                    jacobi::visit(last, head, tangents, points, impulses, [&mut a, &mut b], step);
                 }
                 Visit::Penalty => penalty::visit(head, tangents, points, impulses, &mut a, &mut b),
                 Visit::Restitution => push::restitution(head, points, impulses, &mut a, &mut b, step),

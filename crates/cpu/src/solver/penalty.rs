@@ -7,8 +7,8 @@ use crate::math::{finite, vec3};
 use glam::Vec3;
 use tumble_core::layout::{ConstraintHead, ConstraintPoint, Impulse, SolverBody};
 
-/// One visit to one constraint. The head's `bias_rate` is the spring's, its `mass_scale` the share of the speed that the
-/// damper takes; friction takes the same share, within the cone.
+/// One visit to one constraint. The head's `bias_rate` is the spring's, its `mass_scale` the share of the speed that
+/// the damper takes; friction takes the same share, within the cone.
 pub(super) fn visit(
     head: &ConstraintHead,
     [t1, t2]: [Vec3; 2],
