@@ -4,7 +4,7 @@
 //   integrate_velocities   velocities in `solver_bodies`, from `work_states` (forces) and `props`
 //   integrate_positions    translation and delta there
 //   first_substep, next_substep, last_substep   both, as one pass wants it
-//   commit                 `states` from `solver_bodies` and `work_states`; counts and names bodies in quarantine
+//   commit                 `states` from `solver_bodies`, `shares` and `work_states`; counts and names bodies in quarantine
 //   write_poses            `poses`, the bodies' own frames for users and renderers, from `states` and `props`
 //
 // Rotation by the implicit midpoint rule with Cayley's map: Simo and Wong, "Unconditionally Stable Algorithms for Rigid
@@ -18,6 +18,8 @@
 
 // Largest turn of a body in a sub-step, rad; it bounds the number of pieces of a turn.
 const MAX_TURN: f32 = 32.0;
+// Flags of a body that stands still, whatever its kind.
+const STILL: u32 = BODY_FROZEN | BODY_ASLEEP;
 // Beyond this a velocity (m/s, rad/s) or position (m) is taken for what it is: an explosion.
 const STATE_LIMIT: f32 = 1e9;
 // Share of a body's eigenvalue that comes from its neighbours.
@@ -33,6 +35,7 @@ const COUNTER_FROZEN_COUNT: u32 = 108u; // scratch word of the counters
 @group(0) @binding(4) var<storage, read_write> solver_bodies: array<SolverBody>;
 @group(0) @binding(5) var<storage, read_write> states: array<BodyState>;
 @group(0) @binding(6) var<storage, read_write> poses: array<PoseRecord>;
+@group(0) @binding(8) var<storage, read> shares: array<u32>;
 @group(0) @binding(7) var<storage, read_write> counters: array<atomic<u32>>;
 
 // Acceleration by gravity and force, m/s².
@@ -147,7 +150,7 @@ fn turn(i: u32, h: f32) {
 // a constant force). One that is touched moves by the velocity that its contacts were solved for.
 fn integrate_position(i: u32) {
     let kind = work_states[i].flags & BODY_KIND;
-    if kind == BODY_NONE || kind == BODY_FIXED || (work_states[i].flags & BODY_FROZEN) != 0u {
+    if kind == BODY_NONE || kind == BODY_FIXED || (work_states[i].flags & STILL) != 0u {
         return;
     }
     var way = solver_bodies[i].linear_velocity * step.h;
@@ -261,9 +264,10 @@ fn commit(
     var state = work_states[i];
     state.force = vec3<f32>();
     state.torque = vec3<f32>();
-    if (state.flags & BODY_KIND) != BODY_NONE && (state.flags & BODY_FROZEN) == 0u {
+    if (state.flags & BODY_KIND) != BODY_NONE && (state.flags & STILL) == 0u {
         let body = solver_bodies[i];
-        let position = state.position + body.translation;
+        // Its way, or as much of it as leads into nothing that stands still (`continuous`).
+        let position = state.position + body.translation * bitcast<f32>(shares[i]);
         let good = small(position) && small(body.linear_velocity) && small(body.angular_velocity)
             && is_finite4(body.delta);
         if good {

@@ -71,6 +71,9 @@ fn check_solver(
     floats.check(what, impulse, (&changes(&impulses[0]), &changes(&impulses[1])), |change| *change);
     assert!(impulses[0].iter().map(|i| i.feature).eq(impulses[1].iter().map(|i| i.feature)), "{what}: features");
     let both = (&used(&cpu.1.heads, &cpu.1.points)[..], &used(&cpu.1.heads, &gpu.1.points)[..]);
+    let more =
+        |points: &[ConstraintPoint]| -> Vec<f32> { points.iter().zip(&mass).map(|(p, m)| p.deviation / m).collect() };
+    floats.check(what, impulse, (&more(both.0), &more(both.1)), |x| [*x]);
     let totals = |points: &[ConstraintPoint]| -> Vec<[f32; 3]> {
         points.iter().zip(&mass).map(|(p, m)| p.total.map(|total| total / m)).collect()
     };
@@ -110,7 +113,7 @@ fn prepare_builds_the_mirrors_rows() {
             let heads = &rows.heads;
             assert!(used(heads, &rows.impulses) == used(heads, &stage.rows.impulses), "{what}: impulses");
             let both = (&used(heads, &stage.rows.points)[..], &used(heads, &rows.points)[..]);
-            let exact = |p: &ConstraintPoint| (p.anchor, p.total, p.pad_a, p.pad_b);
+            let exact = |p: &ConstraintPoint| (p.anchor, p.total, p.deviation, p.pad_b);
             assert!(both.0.iter().map(exact).eq(both.1.iter().map(exact)), "{what}: points");
             floats.check(&what, off::SEPARATION, both, |p| [p.adjusted_separation]);
             floats.check(&what, off::MASSES, both, |p| [p.normal_mass, p.tangent_mass]);
@@ -118,7 +121,7 @@ fn prepare_builds_the_mirrors_rows() {
 
             let unused = |head: &ConstraintHead| 4 - head.count as usize;
             let mark = u32::from_ne_bytes([mark; 4]);
-            let marked = rows.points.iter().filter(|p| p.pad_a == mark).count();
+            let marked = rows.points.iter().filter(|p| p.pad_b == mark).count();
             assert_eq!(marked, heads.iter().map(unused).sum::<usize>(), "{what}: only points in use are written");
             assert_eq!(rows.impulses.iter().filter(|i| i.feature == mark).count(), marked, "{what}: impulses too");
         }

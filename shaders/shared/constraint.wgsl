@@ -25,7 +25,7 @@ struct ConstraintPoint {
     normal_mass: f32,
     tangent_mass: f32,
     approach: f32,
-    pad_a: u32,
+    deviation: f32,
     total: vec3<f32>,
     pad_b: u32,
 }
@@ -42,5 +42,6 @@ struct ManifoldMemory {
     pad_a: u32,
     pad_b: u32,
     pad_c: u32,
+    deviations: array<f32, 4>,
     totals: array<array<f32, 3>, 4>,
 }

@@ -1,6 +1,7 @@
 // Builds the step's solver bodies and constraint rows. Twin of crates/cpu/src/solver/prepare.rs.
 //
-//   bodies        one thread a body: `solver_bodies` from `work_states`, `props` and `masks` (the batches it is in)
+//   bodies        one thread a body: `solver_bodies` from `work_states`, `props` and `masks` (the batches it is in); all of
+//                 its way in `shares`
 //   constraints   one thread a constraint, in batch order: `heads` and `points` from the manifold of its pair
 //   carry         the same: `impulses`, those of `slot_impulses` for points whose features stayed; `slot_memory`
 //
@@ -32,6 +33,7 @@ const NO_FEATURE: u32 = 0xffffffffu;
 @group(0) @binding(11) var<storage, read_write> heads: array<ConstraintHead>;
 @group(0) @binding(12) var<storage, read_write> points: array<ConstraintPoint>;
 @group(0) @binding(13) var<storage, read_write> impulses: array<Impulse>;
+@group(0) @binding(15) var<storage, read_write> shares: array<u32>;
 @group(0) @binding(14) var<storage, read> slot_memory: array<ManifoldMemory>;
 
 // A body as the solver moves it; what nothing may push has no mass and keeps its velocity.
@@ -67,6 +69,7 @@ fn bodies(
         return;
     }
     solver_bodies[i] = prepare_body(i);
+    shares[i] = bitcast<u32>(1.0);
 }
 
 // Coefficient of two colliders by the stronger of their rules (`CombineRule`).
@@ -162,7 +165,7 @@ fn constraints(
             inverse(response(a, b, ra, rb, normal, normal)),
             inverse(stiffest),
             dot(normal, dv),
-            0u,
+            0.0,
             vec3<f32>(),
             0u,
         );
@@ -230,6 +233,7 @@ fn carry(
             // The last that is the same, though no two should be.
             let k = select(select(select(0u, 1u, same.y), 2u, same.z), 3u, same.w);
             impulse = slot_impulses[first + k];
+            points[4u * c + i].deviation = slot_memory[next_pairs[index].slot].deviations[k];
         }
         impulses[4u * c + i] = impulse;
     }

@@ -143,7 +143,7 @@ impl Rows {
                 let manifold = contact.manifold;
                 group.set_head(lane, &prepare::prepare_head(&contact, colliders, bodies, step), manifold.between);
                 for point in 0..manifold.count as usize {
-                    group.set_point(lane, point, &manifold.points[point], &prepare::carry(&contact, point));
+                    group.set_point(lane, point, &manifold.points[point], prepare::carry(&contact, point));
                 }
             }
             prepare_lanes::prepare(group, rows);
@@ -191,6 +191,7 @@ impl PlainRows {
             impulses: std::array::from_fn(|k| (impulses[k].normal, impulses[k].tangent)),
             totals: std::array::from_fn(|k| points[k].total),
             remembered: self.heads[c].remembered,
+            deviations: std::array::from_fn(|k| points[k].deviation),
         }
     }
 

@@ -87,11 +87,11 @@ pub fn prepare_constraint(
             normal_mass: inverse(along(normal, normal)),
             tangent_mass: inverse(stiffest),
             approach: normal.dot(dv),
-            pad_a: 0,
+            deviation: 0.0,
             total: [0.0; 3],
             pad_b: 0,
         };
-        impulses[i] = carry(contact, i);
+        (impulses[i], points[i].deviation) = carry(contact, i);
     }
     (head, points, impulses)
 }
@@ -142,12 +142,14 @@ fn remembered(contact: &Contact<'_>) -> f32 {
     if fresh { 0.0 } else { contact.memory.remembered / contact.manifold.count as f32 }
 }
 
-/// The impulse that the slot remembers for a point whose feature stayed.
-pub(super) fn carry(contact: &Contact<'_>, point: usize) -> Impulse {
+/// What the slot remembers of a point whose feature stayed: its impulse, and what it bears more than the mean.
+pub(super) fn carry(contact: &Contact<'_>, point: usize) -> (Impulse, f32) {
     let feature = contact.manifold.features[point];
     let fresh = contact.pair.kind & pair_kind::FRESH != 0;
-    let stored = contact.stored.iter().rfind(|s| !fresh && s.feature == feature);
-    stored.copied().unwrap_or(Impulse { normal: 0.0, tangent: [0.0; 2], feature })
+    match contact.stored.iter().rposition(|s| !fresh && s.feature == feature) {
+        Some(k) => (contact.stored[k], contact.memory.deviations[k]),
+        None => (Impulse { normal: 0.0, tangent: [0.0; 2], feature }, 0.0),
+    }
 }
 
 /// Coefficient of two colliders by the stronger of their rules (`CombineRule`).
