@@ -16,7 +16,7 @@ use tumble_bench::machine::Machine;
 use tumble_bench::record::{self, Kind, Outcome, Record};
 use tumble_bench::run::{Conditions, Heat, heats};
 use tumble_bench::scaling;
-use tumble_core::scenes;
+use tumble_core::{GaussSeidel, Jacobi, OnePass, Penalty, Soft, Solver, scenes};
 use tumble_gpu::Gpu;
 
 const NAME: &str = "speed_vs_error";
@@ -43,6 +43,10 @@ struct Args {
     /// Engines, by name, with commas between
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     engines: Vec<String>,
+    /// tumble's solvers, by name, with commas between: one-pass, soft, gauss-seidel, jacobi, penalty. `scaling` and
+    /// `stages` are measured with the first
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = solver, default_value = "one-pass,soft")]
+    solvers: Vec<Solver>,
     /// Numbers of sub-steps [default: 1,2,4,8,16,32]
     #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=256))]
     substeps: Vec<u32>,
@@ -67,6 +71,18 @@ struct Args {
     /// What cargo says to every bench
     #[arg(long, hide = true)]
     bench: bool,
+}
+
+/// The solver of this name, as it is at first.
+fn solver(name: &str) -> Result<Solver, String> {
+    Ok(match name {
+        "one-pass" => Solver::OnePass(OnePass::default()),
+        "soft" => Solver::Soft(Soft::default()),
+        "gauss-seidel" => Solver::GaussSeidel(GaussSeidel::default()),
+        "jacobi" => Solver::Jacobi(Jacobi::default()),
+        "penalty" => Solver::Penalty(Penalty::default()),
+        _ => return Err("there are one-pass, soft, gauss-seidel, jacobi and penalty".into()),
+    })
 }
 
 fn main() -> ExitCode {
@@ -132,6 +148,7 @@ impl Table {
                     && r.case == heat.case.name
                     && r.seed == heat.seed
                     && r.engine == contestant.name
+                    && ["", &r.solver].contains(&contestant.solver(setting).as_str())
                     && r.substeps == setting.substeps
                     && r.dt == f64::from(setting.dt)
             })
@@ -164,7 +181,8 @@ fn measure(args: &Args, machine: Machine, table: &mut Table) -> Result<(), Strin
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     let threads = args.threads.map_or(threads, |n| n as usize);
     let limit = if args.quick { 3.0 } else { args.limit };
-    let conditions = Conditions { means: Means::new(gpu, args.python.clone()), threads, limit, machine };
+    let (means, solvers) = (Means::new(gpu, args.python.clone()), args.solvers.clone());
+    let conditions = Conditions { means, threads, solvers, limit, machine };
     let contestants = contestants(args, &conditions, table)?;
     let all = heats(
         &chosen(args)?,
@@ -289,8 +307,9 @@ fn print(case: &Case, seed: u64, records: &[Record]) {
         let (median, p95) = (ms(r.ms_median), ms(r.ms_p95));
         let value = r.value.map_or_else(|| r.note.clone(), |v| format!("{:11.4e} {} {}", v, r.unit, r.quantity));
         println!(
-            "  {:<12} dt 1/{:<4.0} {:>3} sub-steps {median:>9} ms (p95 {p95:>9})  {value}",
+            "  {:<12} {:<12} dt 1/{:<4.0} {:>3} sub-steps {median:>9} ms (p95 {p95:>9})  {value}",
             r.engine,
+            r.solver,
             1.0 / r.dt,
             r.substeps
         );

@@ -117,7 +117,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             speculative_distance, restitution_threshold, body_count, collider_count, pair_capacity, cell_table_bits,
             large_limit, edit_ranges, drop_pair, write_poses, batch_rounds, last_limit, wide_batches,
             static_bias_rate, static_mass_scale, static_impulse_scale, memory_gain, memory_limit,
-            memory_band, blow_speed, solver, batching, sleep_distance, sleep_time, wake_all, pad_a, pad_b, pad_c
+            memory_band, blow_speed, solver, batching, sleep_distance, sleep_time, wake_all, iterations, slop, pad_a
         }
     })
 }
@@ -136,7 +136,7 @@ macro_rules! constants {
 fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
     constants! {
         body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN, ASLEEP, STAYS_AWAKE }
-        solver as "SOLVER_" { ONE_PASS, SOFT }
+        solver as "SOLVER_" { ONE_PASS, SOFT, GAUSS_SEIDEL, JACOBI, PENALTY }
         shape_kind as "SHAPE_" { NONE, BALL, CUBOID, HALFSPACE }
         aabb_body as "AABB_" { INDEX, FIXED, DYNAMIC, LIVE, ASLEEP }
         pair_kind as "PAIR_" {

@@ -14,11 +14,11 @@ mod frame;
 #[path = "common/stage.rs"]
 mod stage;
 
-use alone::{Alone, Chain};
+use alone::Alone;
 use floats::Floats;
-use stage::{LOAD, PASS, PERMUTATIONS, RELAX, RESTITUTION, SOLVE, Stage, WARM_START, solvers, still, used};
+use stage::{PERMUTATIONS, Stage, VisitPasses, solvers, still, used};
 use tumble_core::layout::*;
-use tumble_core::scenes;
+use tumble_core::{Solver, scenes};
 use tumble_cpu::solver::{Bodies, PlainRows, Visit, solve_plain};
 
 /// What each field may be off: (name, tolerance), with the largest error that was measured on llvmpipe beside it.
@@ -203,25 +203,7 @@ fn a_whole_step_of_sweeps_stays_together() {
             let what = format!("{what}, permuted {permute}");
             stage.put(alone, 8);
             alone.run(|chain| {
-                let (substeps, soft) = (stage.frame.step.substeps, stage.frame.step.solver == solver::SOFT);
-                let body = |chain: &mut Chain, entry| chain.pass("motion", entry, stage.by_body());
-                if !soft {
-                    body(chain, "first_substep");
-                    stage.sweep(chain, LOAD, 8);
-                }
-                for substep in 1..=substeps {
-                    if soft {
-                        body(chain, "integrate_velocities");
-                        stage.sweep(chain, WARM_START, 8);
-                        stage.sweep(chain, SOLVE, 8);
-                        body(chain, "integrate_positions");
-                        stage.sweep(chain, RELAX, 8);
-                    } else {
-                        stage.sweep(chain, PASS, 8);
-                        body(chain, if substep < substeps { "next_substep" } else { "last_substep" });
-                    }
-                }
-                stage.sweep(chain, RESTITUTION, 8);
+                stage.solve(chain);
                 chain.pass("solver/store", "store", stage.by_constraint());
             });
             let gpu = Stage::take_solver(alone);
@@ -261,6 +243,9 @@ fn a_stopped_step_writes_nothing() {
         chain.pass("solver/prepare", "bodies", by_body);
         chain.pass("solver/prepare", "constraints", by_constraint);
         chain.pass("solver/prepare", "carry", by_constraint);
+        for entry in ["begin", "settle"] {
+            chain.pass("solver/classic", entry, by_body);
+        }
         for visit in solvers().into_iter().flat_map(|(_, visits)| visits) {
             stage.sweep(chain, visit, 8);
         }
@@ -271,10 +256,19 @@ fn a_stopped_step_writes_nothing() {
     }
 }
 
+/// Visits that apply or weigh what earlier steps found: nothing of a bad body gets there.
+const BEFORE_PUSHES: [Visit; 3] = [Visit::WarmStart, Visit::Load, Visit::Split];
+
 /// A body whose velocity is no number pushes nothing: what the others do is what they do when nothing of it is pushed.
 #[test]
 fn a_bad_body_harms_no_other() {
-    let mut stage = Stage::new(&scenes::pile(300), 60);
+    for (solver, visits) in solvers() {
+        bad_body_harms_no_other(solver, &visits);
+    }
+}
+
+fn bad_body_harms_no_other(solver: Solver, visits: &[VisitPasses]) {
+    let mut stage = Stage::by(solver, &scenes::pile(300), 60);
     stage.advance();
     let most = |b: &u32| stage.rows.heads.iter().filter(|h| h.body_a == *b || h.body_b == *b).count();
     let bad = (5..305).max_by_key(most).unwrap();
@@ -291,7 +285,7 @@ fn a_bad_body_harms_no_other() {
     ill[bad as usize].linear_velocity = [f32::NAN; 3];
     let alone = &mut Alone::new(0);
     stage.put(alone, 8);
-    for visit in [PASS, SOLVE, RELAX, RESTITUTION] {
+    for &visit in visits.iter().filter(|visit| !BEFORE_PUSHES.contains(&visit.0)) {
         let mut sweep = |bodies: &[SolverBody], rows: &PlainRows| {
             alone.put("solver_bodies", bodies);
             alone.put("heads", &rows.heads);
@@ -305,7 +299,7 @@ fn a_bad_body_harms_no_other() {
         let (with, without) = (sweep(&ill, &stage.rows), sweep(&stage.bodies, &mute));
         for (side, (with, without)) in ["CPU", "GPU"].iter().zip(with.iter().zip(&without)) {
             for (i, (with, without)) in with.iter().zip(without).enumerate().filter(|(i, _)| *i != bad as usize) {
-                assert_eq!(with, without, "{side}, {visit:?}: body {i}");
+                assert_eq!(with, without, "{solver}, {side}, {visit:?}: body {i}");
             }
         }
     }

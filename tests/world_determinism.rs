@@ -14,7 +14,10 @@ use frame::{Cpu, scene_of};
 use tumble::World;
 use tumble_core::glam::Vec3;
 use tumble_core::layout::SolverBody;
-use tumble_core::{ColliderBuilder, OnePass, Params, RigidBodyBuilder, Scene, Soft, Solver, measures, scenes};
+use tumble_core::{
+    ColliderBuilder, GaussSeidel, Jacobi, OnePass, Params, Penalty, RigidBodyBuilder, Scene, Soft, Solver, measures,
+    scenes,
+};
 use tumble_cpu::solver::store::Solved;
 use tumble_cpu::solver::{Bodies, Rows, solve, solve_plain};
 use tumble_gpu::Pipelines;
@@ -147,7 +150,13 @@ fn four_at_a_time() {
         ("pyramid", scenes::pyramid(15), 5),
     ];
     let threads = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
-    let solvers = [Solver::OnePass(OnePass::default()), Solver::Soft(Soft::default())];
+    let solvers = [
+        Solver::OnePass(OnePass::default()),
+        Solver::Soft(Soft::default()),
+        Solver::GaussSeidel(GaussSeidel::default()),
+        Solver::Jacobi(Jacobi::default()),
+        Solver::Penalty(Penalty::default()),
+    ];
     for ((name, scene, count), solver) in scenes.iter().flat_map(|scene| solvers.map(|solver| (scene, solver))) {
         let cpu = Cpu::after_by(solver, scene, *count);
         for recolor in [false, true] {

@@ -9,6 +9,9 @@ const BATCHING_STATIC_LAST: u32 = 4u;
 
 const SOLVER_ONE_PASS: u32 = 0u;
 const SOLVER_SOFT: u32 = 1u;
+const SOLVER_GAUSS_SEIDEL: u32 = 2u;
+const SOLVER_JACOBI: u32 = 3u;
+const SOLVER_PENALTY: u32 = 4u;
 
 struct StepParams {
     dt: f32,
@@ -46,7 +49,7 @@ struct StepParams {
     sleep_distance: f32,
     sleep_time: f32,
     wake_all: u32,
+    iterations: u32,
+    slop: f32,
     pad_a: u32,
-    pad_b: u32,
-    pad_c: u32,
 }

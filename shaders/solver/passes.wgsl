@@ -12,36 +12,13 @@
 // Harada, "Parallelizing the Physics Pipeline" (GDC 2009). Loops: 9 turns for each 256 constraints of the tail; in the
 // last batch 9 for each of the 128, and one a thread.
 
-//#import shared/control.wgsl
-//#import shared/thread.wgsl
 //#import solver/one_pass.wgsl
 //#import solver/soft.wgsl
-
-struct BatchIndex {
-    index: u32,
-    pad_a: u32,
-    pad_b: u32,
-    pad_c: u32,
-}
-
-@group(0) @binding(0) var<uniform> control: Control;
-@group(0) @binding(1) var<uniform> step: StepParams;
-@group(0) @binding(2) var<uniform> batch: BatchIndex;
-@group(0) @binding(3) var<storage, read_write> heads: array<ConstraintHead>;
-@group(0) @binding(4) var<storage, read_write> points: array<ConstraintPoint>;
-@group(0) @binding(5) var<storage, read_write> impulses: array<Impulse>;
-@group(0) @binding(6) var<storage, read_write> solver_bodies: array<SolverBody>;
+//#import solver/sweep.wgsl
 
 // Kinds of visit of the one pass; the others are in `solver/soft`.
 const LOAD: u32 = 4u;
 const PASS: u32 = 5u;
-
-const SOLVER_WORKGROUP: u32 = 64u;
-const TURN: u32 = 128u; // constraints of the last batch that one thread visits in a row
-
-fn start_of(index: u32) -> u32 {
-    return control.batch_start[index / 4u][index % 4u];
-}
 
 // One visit to constraint c: normals first, then friction within the cone that they allow. Only the velocities of
 // bodies that move are written. (A constraint has a point at least; a loop that tests at its end saves llvmpipe one
@@ -211,21 +188,6 @@ fn pass_over(c: u32) {
             solver_bodies[head.body_b].angular_start = b.angular_start;
         }
     }
-}
-
-// Constraint of an invocation of the batch's dispatch, or NONE. Workgroups are smaller here than `invocation` takes
-// them to be.
-const NONE: u32 = 0xffffffffu;
-
-fn constraint_of(wg: vec3<u32>, num: vec3<u32>, lid: u32) -> u32 {
-    var local = lid;
-    if PERMUTE == 1u {
-        local = SOLVER_WORKGROUP - 1u - lid;
-    } else if PERMUTE == 2u {
-        local = reverseBits(lid) >> 26u;
-    }
-    let c = start_of(batch.index) + workgroup_index(wg, num) * SOLVER_WORKGROUP + local;
-    return select(NONE, c, c < start_of(batch.index + 1u) && control.stop == 0u);
 }
 
 @compute @workgroup_size(64)

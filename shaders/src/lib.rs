@@ -59,12 +59,17 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/tree", include_str!("../shared/tree.wgsl")),
     ("shared/workgroup", include_str!("../shared/workgroup.wgsl")),
     ("sleep", include_str!("../sleep.wgsl")),
+    ("solver/classic", include_str!("../solver/classic.wgsl")),
+    ("solver/gauss_seidel", include_str!("../solver/gauss_seidel.wgsl")),
+    ("solver/jacobi", include_str!("../solver/jacobi.wgsl")),
     ("solver/one_pass", include_str!("../solver/one_pass.wgsl")),
     ("solver/passes", include_str!("../solver/passes.wgsl")),
+    ("solver/penalty", include_str!("../solver/penalty.wgsl")),
     ("solver/prepare", include_str!("../solver/prepare.wgsl")),
     ("solver/push", include_str!("../solver/push.wgsl")),
     ("solver/soft", include_str!("../solver/soft.wgsl")),
     ("solver/store", include_str!("../solver/store.wgsl")),
+    ("solver/sweep", include_str!("../solver/sweep.wgsl")),
 ];
 
 const IMPORT: &str = "//#import ";

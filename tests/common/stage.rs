@@ -2,7 +2,7 @@
 
 use bytemuck::Zeroable;
 use tumble_core::layout::*;
-use tumble_core::{OnePass, Scene, Soft, Solver, scenes};
+use tumble_core::{GaussSeidel, Jacobi, OnePass, Penalty, Scene, Soft, Solver, scenes};
 use tumble_cpu::solver::{Bodies, PlainRows, Visit, solve_plain};
 
 use crate::alone::{Alone, Chain};
@@ -10,20 +10,31 @@ use crate::frame::{Cpu, Frame, control_of, scene_of};
 
 pub(crate) const PERMUTATIONS: [u32; 3] = [0, 1, 2];
 pub(crate) const SIZES: [usize; 7] = [0, 1, 2, 255, 256, 257, 3000];
-/// Visits, and the passes that make them.
+/// A visit, and the shader and pass that makes it; behind `_tail` that of the other batches.
 pub(crate) type VisitPasses = (Visit, &'static str, &'static str);
-pub(crate) const WARM_START: VisitPasses = (Visit::WarmStart, "warm_start", "warm_start_tail");
-pub(crate) const SOLVE: VisitPasses = (Visit::Solve, "solve", "solve_tail");
-pub(crate) const RELAX: VisitPasses = (Visit::Relax, "relax", "relax_tail");
-pub(crate) const LOAD: VisitPasses = (Visit::Load, "load", "load_tail");
-pub(crate) const PASS: VisitPasses = (Visit::Pass, "one_pass", "one_pass_tail");
-pub(crate) const RESTITUTION: VisitPasses = (Visit::Restitution, "restitution", "restitution_tail");
+const PASSES: &str = "solver/passes";
+const CLASSIC: &str = "solver/classic";
+const WARM_START: VisitPasses = (Visit::WarmStart, PASSES, "warm_start");
+const SOLVE: VisitPasses = (Visit::Solve, PASSES, "solve");
+const RELAX: VisitPasses = (Visit::Relax, PASSES, "relax");
+const LOAD: VisitPasses = (Visit::Load, PASSES, "load");
+const PASS: VisitPasses = (Visit::Pass, PASSES, "one_pass");
+const GAUSS_SEIDEL: VisitPasses = (Visit::GaussSeidel, CLASSIC, "gauss_seidel");
+const LAST_GAUSS_SEIDEL: VisitPasses = (Visit::LastGaussSeidel, CLASSIC, "last_gauss_seidel");
+const SPLIT: VisitPasses = (Visit::Split, CLASSIC, "split");
+const JACOBI: VisitPasses = (Visit::Jacobi, CLASSIC, "jacobi");
+const LAST_JACOBI: VisitPasses = (Visit::LastJacobi, CLASSIC, "last_jacobi");
+const PENALTY: VisitPasses = (Visit::Penalty, CLASSIC, "penalty");
+const RESTITUTION: VisitPasses = (Visit::Restitution, PASSES, "restitution");
 
 /// Every solver, with its visits.
-pub(crate) fn solvers() -> [(Solver, Vec<VisitPasses>); 2] {
+pub(crate) fn solvers() -> [(Solver, Vec<VisitPasses>); 5] {
     [
         (Solver::OnePass(OnePass::default()), vec![LOAD, PASS, RESTITUTION]),
         (Solver::Soft(Soft::default()), vec![WARM_START, SOLVE, RELAX, RESTITUTION]),
+        (Solver::GaussSeidel(GaussSeidel::default()), vec![GAUSS_SEIDEL, LAST_GAUSS_SEIDEL, RESTITUTION]),
+        (Solver::Jacobi(Jacobi::default()), vec![SPLIT, JACOBI, LAST_JACOBI, RESTITUTION]),
+        (Solver::Penalty(Penalty::default()), vec![PENALTY, RESTITUTION]),
     ]
 }
 
@@ -126,13 +137,63 @@ impl Stage {
     }
 
     /// One visit to every constraint on the GPU: a dispatch a batch, and one for those from `wide_batches` on.
-    pub(crate) fn sweep(&self, chain: &mut Chain, (_, wide, tail): VisitPasses, wide_batches: u32) {
+    pub(crate) fn sweep(&self, chain: &mut Chain, (_, stem, entry): VisitPasses, wide_batches: u32) {
         for batch in 0..wide_batches {
             let start = &self.frame.batches.start[batch as usize..];
             let groups = (start[1] - start[0]).div_ceil(64) + 1;
-            chain.indexed("solver/passes", wide, ("batch", batch), groups);
+            chain.indexed(stem, entry, ("batch", batch), groups);
         }
-        chain.pass("solver/passes", tail, 1);
+        chain.pass(stem, &format!("{entry}_tail"), 1);
+    }
+
+    /// All sub-steps of a step on the GPU, and the bounces, with 8 wide batches.
+    pub(crate) fn solve(&self, chain: &mut Chain) {
+        let StepParams { substeps, iterations, solver, .. } = self.frame.step;
+        let body = |chain: &mut Chain, stem, entry| chain.pass(stem, entry, self.by_body());
+        let sweep = |chain: &mut Chain, visit| self.sweep(chain, visit, 8);
+        match solver {
+            solver::ONE_PASS => {
+                body(chain, "motion", "first_substep");
+                sweep(chain, LOAD);
+            }
+            solver::JACOBI => sweep(chain, SPLIT),
+            _ => {}
+        }
+        for substep in 1..=substeps {
+            if [solver::SOFT, solver::GAUSS_SEIDEL, solver::JACOBI].contains(&solver) {
+                body(chain, "motion", "integrate_velocities");
+                sweep(chain, WARM_START);
+            }
+            match solver {
+                solver::ONE_PASS => {
+                    sweep(chain, PASS);
+                    body(chain, "motion", if substep < substeps { "next_substep" } else { "last_substep" });
+                    continue;
+                }
+                solver::SOFT => sweep(chain, SOLVE),
+                solver::GAUSS_SEIDEL => {
+                    (1..iterations).for_each(|_| sweep(chain, GAUSS_SEIDEL));
+                    sweep(chain, LAST_GAUSS_SEIDEL);
+                }
+                solver::JACOBI => {
+                    body(chain, CLASSIC, "begin");
+                    for iteration in 1..=iterations {
+                        sweep(chain, if iteration < iterations { JACOBI } else { LAST_JACOBI });
+                        body(chain, CLASSIC, "settle");
+                    }
+                }
+                _ => {
+                    body(chain, "motion", "first_substep");
+                    sweep(chain, PENALTY);
+                    body(chain, CLASSIC, "settle");
+                }
+            }
+            body(chain, "motion", "integrate_positions");
+            if solver == solver::SOFT {
+                sweep(chain, RELAX);
+            }
+        }
+        sweep(chain, RESTITUTION);
     }
 
     /// The state in the midst of a step: one sub-step is done.

@@ -4,8 +4,9 @@ use crate::cases::{self, Case, Run};
 use crate::engines::{Contestant, Engine, Facts, Means, Setting};
 use crate::machine::Machine;
 use crate::record::{Kind, Outcome, Record};
+use crate::report::is_ours;
 use glam::Vec3;
-use tumble_core::{Broadphase, Poses, Scene, Velocities};
+use tumble_core::{Broadphase, Poses, Scene, Solver, Velocities};
 
 /// Turns of a heat. The first half is the warm-up: bodies fall, caches fill, buffers grow, pipelines are compiled.
 const ROUNDS: u64 = 20;
@@ -21,6 +22,8 @@ pub struct Conditions {
     pub means: Means,
     /// Threads of every engine on the CPU.
     pub threads: usize,
+    /// tumble's solvers: each runs every case. What has no error is measured with the first.
+    pub solvers: Vec<Solver>,
     /// Seconds that one engine with one setting may step in one heat; past them it is given up as slow.
     pub limit: f64,
     /// Where it runs.
@@ -61,7 +64,17 @@ impl Conditions {
     /// A setting as all engines get it.
     pub fn setting(&self, dt: f64, substeps: u32) -> Setting {
         let (dt, threads) = (dt as f32, self.threads);
-        Setting { dt, substeps, threads, broadphase: Broadphase::Auto, profile: false }
+        let solver = self.solvers.first().copied().unwrap_or_default();
+        Setting { dt, substeps, threads, broadphase: Broadphase::Auto, solver, profile: false }
+    }
+
+    /// The setting with each solver that the engine can run with.
+    fn with_solvers(&self, contestant: &Contestant, setting: Setting) -> Vec<Setting> {
+        let choice = if is_ours(contestant.name) { &self.solvers[..] } else { &[] };
+        match choice {
+            [] => vec![setting],
+            solvers => solvers.iter().map(|&solver| Setting { solver, ..setting }).collect(),
+        }
     }
 }
 
@@ -91,7 +104,9 @@ pub fn heats(
             settings.extend(dts.iter().map(|&dt| conditions.setting(dt, SUBSTEPS)));
         }
         for seed in 1..=case.seeds.min(most_seeds) {
-            let entries = settings.iter().flat_map(|&s| contestants.iter().map(move |&c| (c, s))).collect();
+            let all = |&s: &Setting| contestants.iter().map(move |c| (*c, conditions.with_solvers(c, s)));
+            let entries = settings.iter().flat_map(all).flat_map(|(c, all)| all.into_iter().map(move |s| (c, s)));
+            let entries = entries.collect();
             heats.push(Heat { case, seed: if case.seeds > 1 { seed } else { 0 }, entries });
         }
     }
@@ -182,7 +197,9 @@ impl Heat {
             substeps: lane.setting.substeps,
             seed: self.seed,
             broadphase: lane.facts.broadphase.clone(),
-            solver: lane.facts.solver.clone(),
+            solver: Some(lane.facts.solver.clone())
+                .filter(|told| !told.is_empty())
+                .unwrap_or_else(|| lane.contestant.solver(&lane.setting)),
             steps: lane.times.len() as u32,
             ms_median: quantile(&lane.times, 0.5),
             ms_p95: quantile(&lane.times, 0.95),

@@ -36,8 +36,10 @@ pub fn scaling(bodies: usize, contestants: &[Contestant], conditions: &Condition
             _ => &[Broadphase::Auto],
         };
         for &broadphase in broadphases {
-            let record = Record { bodies: count as u32, ..conditions.record(Kind::Scaling, SCALED, contestant.name) };
             let setting = Setting { broadphase, ..conditions.setting(DT, SUBSTEPS) };
+            let solver = contestant.solver(&setting);
+            let base = conditions.record(Kind::Scaling, SCALED, contestant.name);
+            let record = Record { bodies: count as u32, solver, ..base };
             let made = match free_memory() {
                 Some(free) if free < needed => Err(Refusal::TooMany(format!(
                     "not run: {count} bodies need some {:.0} GB of memory for all engines, {:.0} GB are free",
@@ -107,7 +109,6 @@ impl Lane {
             version: facts.version,
             adapter: facts.adapter,
             broadphase: facts.broadphase,
-            solver: facts.solver,
             steps: self.times.len() as u32,
             ms_median: quantile(&self.times, 0.5),
             ms_p95: quantile(&self.times, 0.95),
@@ -136,8 +137,8 @@ pub fn stages(
     let mut records = Vec::new();
     for contestant in contestants.iter().filter(|c| c.name.starts_with("tumble")) {
         let setting = Setting { profile: true, ..conditions.setting(DT, SUBSTEPS) };
-        let record =
-            Record { bodies: dynamic(scene).count() as u32, ..conditions.record(Kind::Stage, name, contestant.name) };
+        let (bodies, solver) = (dynamic(scene).count() as u32, contestant.solver(&setting));
+        let record = Record { bodies, solver, ..conditions.record(Kind::Stage, name, contestant.name) };
         match staged(scene, &setting, warm_up, steps, contestant, conditions, &record) {
             Ok(lines) => records.extend(lines),
             Err(note) => records.push(Record { outcome: Outcome::Failed, note, ..record }),

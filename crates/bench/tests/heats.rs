@@ -6,8 +6,9 @@ use tumble_bench::cases::{self, Case};
 use tumble_bench::engines::{self, Contestant, Engine, Facts, Make, Means, Refusal, Setting};
 use tumble_bench::machine::Machine;
 use tumble_bench::record::{self, Kind, Outcome, Record};
+use tumble_bench::report;
 use tumble_bench::run::{Conditions, heats, quantile};
-use tumble_core::{BodyHandle, Pose, Poses, Scene, Velocities, Velocity, measures};
+use tumble_core::{BodyHandle, Pose, Poses, Scene, Soft, Solver, Velocities, Velocity, measures};
 
 thread_local! {
     /// Who stepped, in order.
@@ -114,7 +115,7 @@ fn contestant(name: &'static str, make: Make) -> Contestant {
 
 fn conditions() -> Conditions {
     let machine = Machine { name: "a, \"machine\"".into(), commit: "abc+".into(), date: "2026-11-22".into() };
-    Conditions { means: Means::default(), threads: 2, limit: 20.0, machine }
+    Conditions { means: Means::default(), threads: 2, solvers: Vec::new(), limit: 20.0, machine }
 }
 
 fn column() -> &'static Case {
@@ -221,6 +222,27 @@ fn settings_are_those_asked_for() {
     // Another dt only where there is a formula; seeds only where there is chaos.
     assert_eq!(told, [("sliding box", 0, 3), ("pile 1000", 1, 2), ("pile 1000", 2, 2)]);
     assert_eq!(heats[0].entries[2].1.dt, 1.0 / 120.0);
+}
+
+/// tumble runs with each solver, and its lines say which, even where it did not start; the others run once.
+#[test]
+fn each_solver_runs() {
+    let solvers = vec![Solver::default(), Solver::Soft(Soft::default())];
+    let conditions = Conditions { solvers, ..conditions() };
+    let all = [
+        contestant("tumble cpu", good),
+        Contestant { most_bodies: 9, ..contestant("tumble gpu", good) },
+        contestant("other", other),
+    ];
+    let heats = heats(&[column()], &all, &[4], &[], 1, &conditions);
+    let records = heats[0].run(&conditions, &mut |_| {});
+    let lines: Vec<_> = records.iter().filter(|r| r.quantity == "sink").collect();
+    let told: Vec<_> = lines.iter().map(|r| (r.engine.as_str(), r.solver.as_str())).collect();
+    let both = |engine| [(engine, "one pass"), (engine, "soft")];
+    let [cpu, gpu] = [both("tumble cpu"), both("tumble gpu")];
+    assert_eq!(told, [cpu[0], cpu[1], gpu[0], gpu[1], ("other", "")]);
+    let labels: Vec<_> = report::measures(&records)[0].curves.iter().map(|c| c.label.clone()).collect();
+    assert_eq!(labels, ["tumble cpu, one pass", "tumble cpu, soft", "other"]);
 }
 
 #[test]

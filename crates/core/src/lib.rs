@@ -44,6 +44,6 @@ pub use query::{Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Ray, Ray
 pub use report::{Penetration, StageRun, StageTime, StepReport};
 pub use scene::Scene;
 pub use shape::Shape;
-pub use solver::{OnePass, Soft, Solver};
+pub use solver::{GaussSeidel, Jacobi, OnePass, Penalty, Soft, Solver};
 
 pub use glam;

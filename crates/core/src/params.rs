@@ -277,6 +277,8 @@ impl Params {
             memory_limit: law.memory_limit,
             memory_band: law.memory_band,
             blow_speed: BLOW_SPEED,
+            iterations: law.iterations,
+            slop: law.slop,
             solver: self.solver.code(),
             push_speed: self.max_push_speed,
             speculative_distance: self.speculative_distance,

@@ -2,7 +2,10 @@
 //! documented range of each field).
 
 use tumble_core::glam::{Quat, Vec3};
-use tumble_core::{ColliderBuilder, Error, OnePass, PackedScene, Params, RigidBodyBuilder, Scene, Soft, Solver};
+use tumble_core::{
+    ColliderBuilder, Error, GaussSeidel, Jacobi, OnePass, PackedScene, Params, Penalty, RigidBodyBuilder, Scene, Soft,
+    Solver,
+};
 
 const NAN: f32 = f32::NAN;
 const INF: f32 = f32::INFINITY;
@@ -179,12 +182,29 @@ fn params() {
             (by(Solver::Soft(Soft { damping_ratio: bad, ..Soft::default() })), "solver.damping_ratio"),
             (by(Solver::OnePass(OnePass { stiffness: bad, ..OnePass::default() })), "solver.stiffness"),
             (by(Solver::OnePass(OnePass { leak: bad, ..OnePass::default() })), "solver.leak"),
+            (by(Solver::GaussSeidel(GaussSeidel { baumgarte: bad, ..GaussSeidel::default() })), "solver.baumgarte"),
+            (by(Solver::GaussSeidel(GaussSeidel { slop: bad, ..GaussSeidel::default() })), "solver.slop"),
+            (by(Solver::Jacobi(Jacobi { baumgarte: bad, ..Jacobi::default() })), "solver.baumgarte"),
+            (by(Solver::Jacobi(Jacobi { slop: bad, ..Jacobi::default() })), "solver.slop"),
+            (by(Solver::Penalty(Penalty { stiffness_share: bad, ..Penalty::default() })), "solver.stiffness_share"),
+            (by(Solver::Penalty(Penalty { damping_ratio: bad, ..Penalty::default() })), "solver.damping_ratio"),
             (Params { max_push_speed: bad, ..good }, "max_push_speed"),
             (Params { speculative_distance: bad, ..good }, "speculative_distance"),
             (Params { restitution_threshold: bad, ..good }, "restitution_threshold"),
         ]);
     }
     cases.push((Params { dt: 0.0, ..good }, "dt"));
+    for bad in [0, 257] {
+        let (gauss_seidel, jacobi) = (GaussSeidel::default(), Jacobi::default());
+        cases.extend([
+            (by(Solver::GaussSeidel(GaussSeidel { iterations: bad, ..gauss_seidel })), "solver.iterations"),
+            (by(Solver::Jacobi(Jacobi { iterations: bad, ..jacobi })), "solver.iterations"),
+        ]);
+    }
+    // At a share of 0.25 a damping ratio of 0.375 is the bound.
+    let penalty = |stiffness_share, damping_ratio| by(Solver::Penalty(Penalty { stiffness_share, damping_ratio }));
+    penalty(0.25, 0.374).validate().unwrap();
+    cases.extend([(penalty(0.25, 0.376), "solver.damping_ratio"), (penalty(1.0, 0.0), "solver.stiffness_share")]);
     for (params, field) in cases {
         let error = params.validate().expect_err(field);
         assert!(error.to_string().starts_with(&format!("Params: {field} is ")), "{error}");

@@ -6,6 +6,11 @@ use std::sync::Arc;
 use tumble_core::layout::{StepParams, solver};
 use tumble_core::{Plan, Result};
 
+/// Sweeps of one pass and soft, and those that others share.
+const PASSES: &str = "solver/passes";
+/// Sweeps of the solvers that are there for comparison.
+const CLASSIC: &str = "solver/classic";
+
 /// A sweep over all batches: one dispatch for each wide one, one for the rest.
 struct Sweep {
     batch: Arc<Pass>,
@@ -14,8 +19,46 @@ struct Sweep {
 
 /// The sub-steps of one solver.
 enum Law {
-    OnePass { first: Arc<Pass>, load: Sweep, pass: Sweep, next: Arc<Pass>, last: Arc<Pass> },
-    Soft { velocities: Arc<Pass>, warm_start: Sweep, solve: Sweep, positions: Arc<Pass>, relax: Sweep },
+    OnePass {
+        first: Arc<Pass>,
+        load: Sweep,
+        pass: Sweep,
+        next: Arc<Pass>,
+        last: Arc<Pass>,
+    },
+    Soft {
+        start: Start,
+        solve: Sweep,
+        positions: Arc<Pass>,
+        relax: Sweep,
+    },
+    GaussSeidel {
+        start: Start,
+        visit: Sweep,
+        last: Sweep,
+        positions: Arc<Pass>,
+    },
+    Jacobi {
+        split: Sweep,
+        start: Start,
+        begin: Arc<Pass>,
+        visit: Sweep,
+        last: Sweep,
+        settle: Arc<Pass>,
+        positions: Arc<Pass>,
+    },
+    Penalty {
+        first: Arc<Pass>,
+        press: Sweep,
+        settle: Arc<Pass>,
+        positions: Arc<Pass>,
+    },
+}
+
+/// What a sub-step with a warm start begins with.
+struct Start {
+    velocities: Arc<Pass>,
+    warm_start: Sweep,
 }
 
 pub(crate) struct Solver {
@@ -28,10 +71,10 @@ pub(crate) struct Solver {
 }
 
 impl Sweep {
-    fn new(gpu: &Gpu, pipelines: &mut Pipelines, visit: &str) -> Result<Self> {
+    fn new(gpu: &Gpu, pipelines: &mut Pipelines, stem: &str, visit: &str) -> Result<Self> {
         Ok(Self {
-            batch: pipelines.pass(gpu, "solver/passes", visit)?,
-            tail: pipelines.pass(gpu, "solver/passes", &format!("{visit}_tail"))?,
+            batch: pipelines.pass(gpu, stem, visit)?,
+            tail: pipelines.pass(gpu, stem, &format!("{visit}_tail"))?,
         })
     }
 
@@ -45,50 +88,123 @@ impl Sweep {
     }
 }
 
-impl Law {
-    fn new(gpu: &Gpu, pipelines: &mut Pipelines, law: u32) -> Result<Self> {
-        let mut sweep = |visit| Sweep::new(gpu, pipelines, visit);
-        if law == solver::SOFT {
-            let (warm_start, solve, relax) = (sweep("warm_start")?, sweep("solve")?, sweep("relax")?);
-            let mut body = |entry| pipelines.pass(gpu, "motion", entry);
-            let (velocities, positions) = (body("integrate_velocities")?, body("integrate_positions")?);
-            return Ok(Self::Soft { velocities, warm_start, solve, positions, relax });
-        }
-        let (load, pass) = (sweep("load")?, sweep("one_pass")?);
-        let mut body = |entry| pipelines.pass(gpu, "motion", entry);
-        let [first, next, last] = [body("first_substep")?, body("next_substep")?, body("last_substep")?];
-        Ok(Self::OnePass { first, load, pass, next, last })
+impl Start {
+    fn new(gpu: &Gpu, pipelines: &mut Pipelines) -> Result<Self> {
+        let velocities = pipelines.pass(gpu, "motion", "integrate_velocities")?;
+        Ok(Self { velocities, warm_start: Sweep::new(gpu, pipelines, PASSES, "warm_start")? })
     }
 
     fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
-        let (wide, bodies) = (step.wide_batches, step.body_count.div_ceil(256));
+        recorder.dispatch(&self.velocities, &[], by_body(step))?;
+        self.warm_start.record(recorder, buffers, step.wide_batches)
+    }
+}
+
+impl Law {
+    fn new(gpu: &Gpu, pipelines: &mut Pipelines, law: u32) -> Result<Self> {
+        let mut sweep = |stem, visit| Sweep::new(gpu, pipelines, stem, visit);
+        Ok(match law {
+            solver::SOFT => {
+                let (solve, relax) = (sweep(PASSES, "solve")?, sweep(PASSES, "relax")?);
+                let positions = pipelines.pass(gpu, "motion", "integrate_positions")?;
+                Self::Soft { start: Start::new(gpu, pipelines)?, solve, positions, relax }
+            }
+            solver::GAUSS_SEIDEL => {
+                let (visit, last) = (sweep(CLASSIC, "gauss_seidel")?, sweep(CLASSIC, "last_gauss_seidel")?);
+                let positions = pipelines.pass(gpu, "motion", "integrate_positions")?;
+                Self::GaussSeidel { start: Start::new(gpu, pipelines)?, visit, last, positions }
+            }
+            solver::JACOBI => {
+                let (split, visit, last) =
+                    (sweep(CLASSIC, "split")?, sweep(CLASSIC, "jacobi")?, sweep(CLASSIC, "last_jacobi")?);
+                let mut body = |stem, entry| pipelines.pass(gpu, stem, entry);
+                let (begin, settle) = (body(CLASSIC, "begin")?, body(CLASSIC, "settle")?);
+                let positions = body("motion", "integrate_positions")?;
+                Self::Jacobi { split, start: Start::new(gpu, pipelines)?, begin, visit, last, settle, positions }
+            }
+            solver::PENALTY => {
+                let press = sweep(CLASSIC, "penalty")?;
+                let mut body = |stem, entry| pipelines.pass(gpu, stem, entry);
+                let (first, settle) = (body("motion", "first_substep")?, body(CLASSIC, "settle")?);
+                Self::Penalty { first, press, settle, positions: body("motion", "integrate_positions")? }
+            }
+            _ => {
+                let (load, pass) = (sweep(PASSES, "load")?, sweep(PASSES, "one_pass")?);
+                let mut body = |entry| pipelines.pass(gpu, "motion", entry);
+                let [first, next, last] = [body("first_substep")?, body("next_substep")?, body("last_substep")?];
+                Self::OnePass { first, load, pass, next, last }
+            }
+        })
+    }
+
+    fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
+        let (wide, bodies) = (step.wide_batches, by_body(step));
         match self {
-            Self::OnePass { first, load, pass, next, last } => {
+            Self::OnePass { first, load, .. } => {
                 recorder.dispatch(first, &[], bodies)?;
                 load.record(recorder, buffers, wide)?;
-                for substep in 1..=step.substeps {
-                    pass.record(recorder, buffers, wide)?;
-                    recorder.dispatch(if substep < step.substeps { next } else { last }, &[], bodies)?;
-                }
             }
-            Self::Soft { velocities, warm_start, solve, positions, relax } => {
-                for _ in 0..step.substeps {
-                    recorder.dispatch(velocities, &[], bodies)?;
-                    warm_start.record(recorder, buffers, wide)?;
-                    solve.record(recorder, buffers, wide)?;
-                    recorder.dispatch(positions, &[], bodies)?;
-                    relax.record(recorder, buffers, wide)?;
+            Self::Jacobi { split, .. } => split.record(recorder, buffers, wide)?,
+            _ => {}
+        }
+        (1..=step.substeps).try_for_each(|substep| self.record_substep(recorder, buffers, step, substep))
+    }
+
+    fn record_substep(
+        &self,
+        recorder: &mut Recorder,
+        buffers: &Buffers,
+        step: &StepParams,
+        substep: u32,
+    ) -> Result<()> {
+        let (wide, bodies) = (step.wide_batches, by_body(step));
+        match self {
+            Self::OnePass { pass, next, last, .. } => {
+                pass.record(recorder, buffers, wide)?;
+                recorder.dispatch(if substep < step.substeps { next } else { last }, &[], bodies)
+            }
+            Self::Soft { start, solve, positions, relax } => {
+                start.record(recorder, buffers, step)?;
+                solve.record(recorder, buffers, wide)?;
+                recorder.dispatch(positions, &[], bodies)?;
+                relax.record(recorder, buffers, wide)
+            }
+            Self::GaussSeidel { start, visit, last, positions } => {
+                start.record(recorder, buffers, step)?;
+                for _ in 1..step.iterations {
+                    visit.record(recorder, buffers, wide)?;
                 }
+                last.record(recorder, buffers, wide)?;
+                recorder.dispatch(positions, &[], bodies)
+            }
+            Self::Jacobi { start, begin, visit, last, settle, positions, .. } => {
+                start.record(recorder, buffers, step)?;
+                recorder.dispatch(begin, &[], bodies)?;
+                for iteration in 1..=step.iterations {
+                    let visit = if iteration < step.iterations { visit } else { last };
+                    visit.record(recorder, buffers, wide)?;
+                    recorder.dispatch(settle, &[], bodies)?;
+                }
+                recorder.dispatch(positions, &[], bodies)
+            }
+            Self::Penalty { first, press, settle, positions } => {
+                recorder.dispatch(first, &[], bodies)?;
+                press.record(recorder, buffers, wide)?;
+                recorder.dispatch(settle, &[], bodies)?;
+                recorder.dispatch(positions, &[], bodies)
             }
         }
-        Ok(())
     }
+}
+
+fn by_body(step: &StepParams) -> u32 {
+    step.body_count.div_ceil(256)
 }
 
 impl Solver {
     /// With the law of this code (`StepParams::solver`).
     pub(crate) fn new(gpu: &Gpu, pipelines: &mut Pipelines, plan: &Plan, law: u32) -> Result<Self> {
-        let restitution = plan.restitution.then(|| Sweep::new(gpu, pipelines, "restitution")).transpose()?;
+        let restitution = plan.restitution.then(|| Sweep::new(gpu, pipelines, PASSES, "restitution")).transpose()?;
         Ok(Self {
             bodies: pipelines.pass(gpu, "solver/prepare", "bodies")?,
             constraints: pipelines.pass(gpu, "solver/prepare", "constraints")?,
@@ -102,7 +218,7 @@ impl Solver {
     pub(crate) fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
         recorder.stage("prepare");
         let own = buffers.buffer("dispatch_args")?;
-        recorder.dispatch(&self.bodies, &[], step.body_count.div_ceil(256))?;
+        recorder.dispatch(&self.bodies, &[], by_body(step))?;
         recorder.dispatch_indirect(&self.constraints, &[], own, args::CONSTRAINTS)?;
         recorder.dispatch_indirect(&self.carry, &[], own, args::CONSTRAINTS)?;
         recorder.stage("solver");

@@ -10,9 +10,10 @@ mod script;
 pub use rapier::RapierWorld;
 
 use crate::record::Outcome;
+use crate::report::is_ours;
 use std::path::PathBuf;
 use std::time::Instant;
-use tumble_core::{Broadphase, Poses, Scene, StageTime, Velocities};
+use tumble_core::{Broadphase, Poses, Scene, Solver, StageTime, Velocities};
 use tumble_gpu::Gpu;
 
 /// What every engine is told.
@@ -26,6 +27,8 @@ pub struct Setting {
     pub threads: usize,
     /// tumble's broad phase; the others have their own.
     pub broadphase: Broadphase,
+    /// tumble's solver; the others have their own.
+    pub solver: Solver,
     /// Times the stages too, where the engine can.
     pub profile: bool,
 }
@@ -192,6 +195,11 @@ pub const ALL: &[Contestant] = &[
 ];
 
 impl Contestant {
+    /// The solver that it is to run with, as in the table; empty where there is no choice.
+    pub fn solver(&self, setting: &Setting) -> String {
+        if is_ours(self.name) { setting.solver.to_string() } else { String::new() }
+    }
+
     /// Makes the scene in the engine, if it may have so many bodies.
     ///
     /// # Errors

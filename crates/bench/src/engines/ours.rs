@@ -2,7 +2,7 @@
 
 use super::{Engine, Facts, Means, Refusal, Setting, timed};
 use tumble::prelude::*;
-use tumble_core::{Broadphase, Scene, StageTime, Velocities};
+use tumble_core::{Scene, StageTime, Velocities};
 
 /// Position, rotation, both velocities.
 const BYTES_A_BODY: u64 = 4 * (3 + 4 + 3 + 3);
@@ -11,7 +11,7 @@ const BYTES_A_POINT: u64 = 4 * 3;
 
 struct Ours {
     world: World,
-    asked: Broadphase,
+    asked: Setting,
     /// A report of some step that lost something.
     lost: Option<String>,
 }
@@ -26,6 +26,7 @@ fn params(setting: &Setting) -> Params {
         substeps: setting.substeps,
         threads: Some(setting.threads),
         broadphase: setting.broadphase,
+        solver: setting.solver,
         profile: setting.profile,
         ..Params::default()
     }
@@ -34,14 +35,14 @@ fn params(setting: &Setting) -> Params {
 pub(super) fn cpu(scene: &Scene, setting: &Setting, _: &Means) -> Result<Box<dyn Engine>, Refusal> {
     let world = World::new(scene.clone(), params(setting), Backend::Cpu);
     let world = world.map_err(|error| Refusal::Failed(error.to_string()))?;
-    Ok(Box::new(Ours { world, asked: setting.broadphase, lost: None }))
+    Ok(Box::new(Ours { world, asked: *setting, lost: None }))
 }
 
 pub(super) fn gpu(scene: &Scene, setting: &Setting, means: &Means) -> Result<Box<dyn Engine>, Refusal> {
     let gpu = means.gpu.clone().ok_or_else(|| Refusal::Failed("there is no adapter".into()))?;
     let world = tumble_gpu::World::with_gpu(gpu, scene.clone(), params(setting));
     let world = world.map_err(|error| Refusal::Failed(error.to_string()))?;
-    Ok(Box::new(Ours { world: World::Gpu(Box::new(world)), asked: setting.broadphase, lost: None }))
+    Ok(Box::new(Ours { world: World::Gpu(Box::new(world)), asked: *setting, lost: None }))
 }
 
 impl Engine for Ours {
@@ -68,8 +69,8 @@ impl Engine for Ours {
         Facts {
             version: env!("CARGO_PKG_VERSION").into(),
             adapter: report.adapter,
-            broadphase: self.asked.to_string(),
-            solver: "soft".into(),
+            broadphase: self.asked.broadphase.to_string(),
+            solver: self.asked.solver.to_string(),
             differs: Vec::new(),
             floor_bytes: Some(
                 2 * (BYTES_A_BODY * u64::from(report.bodies) + BYTES_A_POINT * u64::from(report.contacts)),

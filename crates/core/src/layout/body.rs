@@ -127,9 +127,9 @@ pub struct SolverBody {
     /// Unused.
     pub pad_c: u32,
     /// One pass: the velocity with which the sub-step began, before impulses, m/s. What the velocity has more, carries
-    /// over.
+    /// over. Jacobi and penalty: the velocity with which the iteration ends, a sum.
     pub linear_start: [f32; 3],
-    /// Sum over the body's contacts of impulse² / mass, J: what the eigenvalue is weighed with.
+    /// Sum over the body's contacts of impulse² / mass, J: what the eigenvalue is weighed with. Jacobi: their number.
     pub weight: f32,
     /// The same of the angular velocity, rad/s.
     pub angular_start: [f32; 3],

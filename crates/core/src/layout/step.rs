@@ -6,6 +6,12 @@ pub mod solver {
     pub const ONE_PASS: u32 = 0;
     /// Soft sub-stepping.
     pub const SOFT: u32 = 1;
+    /// Projected Gauss-Seidel.
+    pub const GAUSS_SEIDEL: u32 = 2;
+    /// Jacobi with mass splitting.
+    pub const JACOBI: u32 = 3;
+    /// Springs and dampers, explicit.
+    pub const PENALTY: u32 = 4;
 }
 
 /// What one step is told, as a uniform. 160 bytes.
@@ -82,12 +88,12 @@ pub struct StepParams {
     pub sleep_time: f32,
     /// 1 when all who sleep wake.
     pub wake_all: u32,
+    /// Gauss-Seidel and Jacobi: visits to every contact in a sub-step.
+    pub iterations: u32,
+    /// The same: overlap left alone, m.
+    pub slop: f32,
     /// Unused.
     pub pad_a: u32,
-    /// Unused.
-    pub pad_b: u32,
-    /// Unused.
-    pub pad_c: u32,
 }
 
 /// Words of [`StepParams::batching`]: a law, and flags.

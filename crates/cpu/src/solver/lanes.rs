@@ -224,9 +224,9 @@ pub(crate) struct BodyLanes {
 }
 
 /// Number of `f32x4` that make one [`SolverBody`].
-const ROWS: usize = size_of::<SolverBody>() / 16;
+pub(crate) const ROWS: usize = size_of::<SolverBody>() / 16;
 /// Row of the linear start with the weight; the next one has the angular start with what is weighted.
-const START: usize = 6;
+pub(crate) const START: usize = 6;
 
 /// A row of each body, as its four numbers of all bodies.
 #[cfg(not(target_feature = "avx"))]

@@ -1,7 +1,6 @@
-//! Stage `solver`: rows (`prepare`), the laws of a visit (`one_pass` and `soft`, on `push`; four constraints at a time
-//! in those called `_lanes`), the passes over
-//! batches (`passes`; in plain form here), and the way back to the store (`store`). Twin of
-//! `shaders/solver/`.
+//! Stage `solver`: rows (`prepare`), the laws of a visit (`one_pass`, `soft`, `gauss_seidel`, `jacobi` and `penalty`, on
+//! `push`; several constraints at a time in those called `_lanes`), the passes over batches (`passes`; in plain form
+//! here), and the way back to the store (`store`). Twin of `shaders/solver/`.
 //!
 //! Contacts are found once a step and solved in sub-steps (Macklin et al., "Small Steps in Physics Simulation", SCA
 //! 2019), by one of these:
@@ -10,14 +9,23 @@
 //!   integrates positions;
 //! - soft, the shape that Box2D 3, Box3D and rapier converged on (Catto, "Solver2D", 2024): in each sub-step velocities
 //!   are integrated, impulses of the last sub-step applied, contacts solved as damped springs, positions integrated, and
-//!   contacts solved again as rigid, which takes out the velocity that the springs put in.
+//!   contacts solved again as rigid, which takes out the velocity that the springs put in;
+//! - Gauss-Seidel and Jacobi: the same, but that contacts are rigid and solved many times before positions are
+//!   integrated;
+//! - penalty: velocities are integrated, contacts push once with what overlaps, positions are integrated.
 //!
 //! Bounces come last.
 
+mod gauss_seidel;
+mod gauss_seidel_lanes;
+mod jacobi;
+mod jacobi_lanes;
 mod lanes;
 pub mod one_pass;
 mod one_pass_lanes;
 mod passes;
+mod penalty;
+mod penalty_lanes;
 pub mod prepare;
 mod prepare_lanes;
 mod push;
@@ -70,7 +78,7 @@ pub type PlainConstraint = (ConstraintHead, [ConstraintPoint; 4], [Impulse; 4]);
 /// What a visit to a constraint does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Visit {
-    /// Soft: applies the impulses of the last visit.
+    /// Soft, Gauss-Seidel, Jacobi: applies the impulses of the last visit.
     WarmStart,
     /// Soft: as springs.
     Solve,
@@ -80,6 +88,18 @@ pub enum Visit {
     Load,
     /// One pass: all there is in a sub-step.
     Pass,
+    /// Gauss-Seidel.
+    GaussSeidel,
+    /// The same, last of a sub-step.
+    LastGaussSeidel,
+    /// Jacobi: counts each body's constraints.
+    Split,
+    /// Jacobi.
+    Jacobi,
+    /// The same, last of a sub-step.
+    LastJacobi,
+    /// Penalty.
+    Penalty,
     /// Bounces.
     Restitution,
 }
@@ -190,6 +210,16 @@ impl PlainRows {
                 }
                 Visit::Load => one_pass::load(head, tangents, points, impulses, &mut a, &mut b),
                 Visit::Pass => one_pass::pass(head, tangents, points, impulses, &mut a, &mut b, step),
+                Visit::GaussSeidel | Visit::LastGaussSeidel => {
+                    let last = visit == Visit::LastGaussSeidel;
+                    gauss_seidel::visit(last, head, tangents, points, impulses, [&mut a, &mut b], step);
+                }
+                Visit::Split => jacobi::split(&mut a, &mut b),
+                Visit::Jacobi | Visit::LastJacobi => {
+                    let last = visit == Visit::LastJacobi;
+                    jacobi::visit(last, head, tangents, points, impulses, [&mut a, &mut b], step);
+                }
+                Visit::Penalty => penalty::visit(head, tangents, points, impulses, &mut a, &mut b),
                 Visit::Restitution => push::restitution(head, points, impulses, &mut a, &mut b, step),
             }
             if a.inverse_mass > 0.0 {
@@ -232,29 +262,59 @@ pub fn solve_plain(rows: &mut PlainRows, bodies: Bodies<'_>, step: &StepParams, 
 
 /// The passes of a step, in order.
 fn schedule(step: &StepParams, restitution: bool) -> Vec<Pass> {
+    use Pass::{Bodies, Sweep};
     let mut passes = Vec::new();
-    if step.solver == solver::SOFT {
-        for _ in 0..step.substeps {
-            passes.push(Pass::Bodies(motion::integrate_velocity));
-            passes.push(Pass::Sweep(Visit::WarmStart));
-            passes.push(Pass::Sweep(Visit::Solve));
-            passes.push(Pass::Bodies(motion::integrate_position));
-            passes.push(Pass::Sweep(Visit::Relax));
+    match step.solver {
+        solver::ONE_PASS => {
+            passes.extend([Bodies(motion::first_substep), Sweep(Visit::Load)]);
+            for _ in 1..step.substeps {
+                passes.extend([Sweep(Visit::Pass), Bodies(motion::next_substep)]);
+            }
+            passes.extend([Sweep(Visit::Pass), Bodies(motion::last_substep)]);
         }
-    } else {
-        passes.push(Pass::Bodies(motion::first_substep));
-        passes.push(Pass::Sweep(Visit::Load));
-        for substep in 1..=step.substeps {
-            passes.push(Pass::Sweep(Visit::Pass));
-            passes.push(Pass::Bodies(if substep < step.substeps {
-                motion::next_substep
-            } else {
-                motion::last_substep
-            }));
-        }
+        solver::JACOBI => passes.push(Sweep(Visit::Split)),
+        _ => {}
+    }
+    let others = if step.solver == solver::ONE_PASS { 0 } else { step.substeps };
+    for _ in 0..others {
+        passes.extend(substep(step));
     }
     if restitution {
-        passes.push(Pass::Sweep(Visit::Restitution));
+        passes.push(Sweep(Visit::Restitution));
+    }
+    passes
+}
+
+/// A sub-step of the solvers whose sub-steps are all alike.
+fn substep(step: &StepParams) -> Vec<Pass> {
+    use Pass::{Bodies, Sweep};
+    let start = [Bodies(motion::integrate_velocity), Sweep(Visit::WarmStart)];
+    let again = step.iterations.saturating_sub(1) as usize;
+    let mut passes = Vec::new();
+    match step.solver {
+        solver::SOFT => {
+            passes.extend(start);
+            passes.extend([Sweep(Visit::Solve), Bodies(motion::integrate_position), Sweep(Visit::Relax)]);
+        }
+        solver::GAUSS_SEIDEL => {
+            passes.extend(start);
+            passes.extend(std::iter::repeat_n(Sweep(Visit::GaussSeidel), again));
+            passes.extend([Sweep(Visit::LastGaussSeidel), Bodies(motion::integrate_position)]);
+        }
+        solver::JACOBI => {
+            passes.extend(start);
+            passes.push(Bodies(jacobi::begin));
+            for _ in 0..again {
+                passes.extend([Sweep(Visit::Jacobi), Bodies(jacobi::settle)]);
+            }
+            passes.extend([Sweep(Visit::LastJacobi), Bodies(jacobi::settle), Bodies(motion::integrate_position)]);
+        }
+        _ => passes.extend([
+            Bodies(motion::first_substep),
+            Sweep(Visit::Penalty),
+            Bodies(jacobi::settle),
+            Bodies(motion::integrate_position),
+        ]),
     }
     passes
 }

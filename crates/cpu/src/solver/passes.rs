@@ -3,8 +3,8 @@
 //! A sweep is a stage a batch, since batches may share bodies. Batches too small to be cut lie one behind the other and
 //! are worked off as one block: handing each to the next thread costs more than it gives.
 
-use super::lanes::{BodyLanes, ConstraintLanes};
-use super::{Bodies, Pass, Rows, Visit, one_pass_lanes, soft_lanes};
+use super::lanes::{BodyLanes, ConstraintLanes, Lane, Weights};
+use super::{Bodies, Pass, Rows, Visit, gauss_seidel_lanes, jacobi_lanes, one_pass_lanes, penalty_lanes, soft_lanes};
 use crate::shared::Shared;
 use crate::workers::{block_of, blocks, run_stages};
 use std::ops::Range;
@@ -97,13 +97,21 @@ fn sweep(groups: &mut [ConstraintLanes], bodies: &Shared<'_, f32x4>, step: &Step
         Visit::Relax => groups.iter_mut().for_each(|group| visit_group(Visit::Relax, group, bodies, step)),
         Visit::Load => groups.iter_mut().for_each(|group| visit_group(Visit::Load, group, bodies, step)),
         Visit::Pass => groups.iter_mut().for_each(|group| visit_group(Visit::Pass, group, bodies, step)),
+        Visit::GaussSeidel => groups.iter_mut().for_each(|group| visit_group(Visit::GaussSeidel, group, bodies, step)),
+        Visit::LastGaussSeidel => {
+            groups.iter_mut().for_each(|group| visit_group(Visit::LastGaussSeidel, group, bodies, step))
+        }
+        Visit::Split => groups.iter_mut().for_each(|group| visit_group(Visit::Split, group, bodies, step)),
+        Visit::Jacobi => groups.iter_mut().for_each(|group| visit_group(Visit::Jacobi, group, bodies, step)),
+        Visit::LastJacobi => groups.iter_mut().for_each(|group| visit_group(Visit::LastJacobi, group, bodies, step)),
+        Visit::Penalty => groups.iter_mut().for_each(|group| visit_group(Visit::Penalty, group, bodies, step)),
         Visit::Restitution => groups.iter_mut().for_each(|group| visit_group(Visit::Restitution, group, bodies, step)),
     }
 }
 
 #[inline(always)]
 fn visit_group(visit: Visit, group: &mut ConstraintLanes, bodies: &Shared<'_, f32x4>, step: &StepParams) {
-    let moved = !matches!(visit, Visit::WarmStart | Visit::Restitution);
+    let moved = !matches!(visit, Visit::WarmStart | Visit::Split | Visit::Restitution);
     // SAFETY: no other thread moves these bodies meanwhile: constraints of one batch share none that moves, a part of
     // several batches is one block, and bodies that do not move are never written (`scatter`).
     let read = |i: usize| unsafe { bodies.get(i) };
@@ -129,6 +137,34 @@ fn visit_group(visit: Visit, group: &mut ConstraintLanes, bodies: &Shared<'_, f3
                 // SAFETY: as above.
                 unsafe { b.start_after(bodies, ib, 1.0, rb, push) };
             }
+        }
+        Visit::GaussSeidel | Visit::LastGaussSeidel => {
+            gauss_seidel_lanes::visit(visit == Visit::LastGaussSeidel, group, &mut a, &mut b, step);
+        }
+        Visit::Split => {
+            let one = || Weights { weight: Lane::ONE, weighted: Lane::ZERO };
+            // SAFETY: as above.
+            unsafe { a.weigh(bodies, ia, one()) };
+            // SAFETY: as above.
+            unsafe { b.weigh(bodies, ib, one()) };
+            return;
+        }
+        Visit::Jacobi | Visit::LastJacobi => {
+            let parts = [jacobi_lanes::parts(read, ia), jacobi_lanes::parts(read, ib)];
+            let [part_a, part_b] = jacobi_lanes::visit(visit == Visit::LastJacobi, group, [&a, &b], parts, step);
+            // SAFETY: as above.
+            unsafe { jacobi_lanes::add_change(&a, &part_a, parts[0], bodies, ia) };
+            // SAFETY: as above.
+            unsafe { jacobi_lanes::add_change(&b, &part_b, parts[1], bodies, ib) };
+            return;
+        }
+        Visit::Penalty => {
+            let [after_a, after_b] = penalty_lanes::visit(group, &a, &b);
+            // SAFETY: as above.
+            unsafe { jacobi_lanes::add_change(&a, &after_a, Lane::ONE, bodies, ia) };
+            // SAFETY: as above.
+            unsafe { jacobi_lanes::add_change(&b, &after_b, Lane::ONE, bodies, ib) };
+            return;
         }
         Visit::Restitution => group.bounce(&mut a, &mut b, step),
     }
