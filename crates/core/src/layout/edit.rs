@@ -24,7 +24,7 @@ pub mod edit_op {
     pub const FORCE_AT: u32 = 9;
     /// The body is put in quarantine.
     pub const FREEZE: u32 = 10;
-    /// A collider is written: data\[0..4\] its 64 bytes, `born` excepted, which is the step's number.
+    /// A collider is written: data\[0..6\] its 96 bytes, `born` excepted, which is the step's number.
     pub const COLLIDER: u32 = 11;
     /// The collider is gone.
     pub const COLLIDER_REMOVE: u32 = 12;

@@ -1,4 +1,4 @@
-//! Stage `solver`: rows (`prepare`), the laws of a visit (`one_pass` and `soft`, on `push`; four constraints at a time
+//! Stage `solver`: rows (`prepare`), the laws of a visit (`one_pass` and `soft`, on `push` and `resist`; four constraints at a time
 //! in those called `_lanes`), the passes over
 //! batches (`passes`; in plain form here), and the way back to the store (`store`). Twin of
 //! `shaders/solver/`.
@@ -22,6 +22,8 @@ pub mod prepare;
 mod prepare_lanes;
 mod push;
 mod push_lanes;
+mod resist;
+mod resist_lanes;
 mod soft;
 mod soft_lanes;
 pub mod store;
@@ -102,6 +104,7 @@ impl Rows {
         start: &[u32],
         colliders: &[Collider],
         bodies: &[SolverBody],
+        states: &[BodyState],
         step: &StepParams,
         contact: impl Fn(usize) -> Contact<'c> + Sync,
     ) {
@@ -121,7 +124,11 @@ impl Rows {
             for lane in 0..count as usize {
                 let contact = contact(first as usize + lane);
                 let manifold = contact.manifold;
-                group.set_head(lane, &prepare::prepare_head(&contact, colliders, bodies, step), manifold.between);
+                group.set_head(
+                    lane,
+                    &prepare::prepare_head(&contact, colliders, bodies, states, step),
+                    manifold.between,
+                );
                 for point in 0..manifold.count as usize {
                     group.set_point(lane, point, &manifold.points[point], &prepare::carry(&contact, point));
                 }
@@ -130,7 +137,8 @@ impl Rows {
         });
         let last = start[LAST_BATCH as usize] as usize..start[LAST_BATCH as usize + 1] as usize;
         self.last_first = last.start;
-        self.last = PlainRows::build(last, |c| prepare::prepare_constraint(&contact(c), colliders, bodies, step));
+        self.last =
+            PlainRows::build(last, |c| prepare::prepare_constraint(&contact(c), colliders, bodies, states, step));
     }
 
     /// Calls `take(c, solved)` for every constraint, from many threads at once.
@@ -171,6 +179,7 @@ impl PlainRows {
             impulses: std::array::from_fn(|k| (impulses[k].normal, impulses[k].tangent)),
             totals: std::array::from_fn(|k| points[k].total),
             remembered: self.heads[c].remembered,
+            resisted: self.heads[c].resisted,
         }
     }
 

@@ -12,6 +12,8 @@ pub struct Solved {
     pub totals: [[f32; 3]; 4],
     /// What a point bears in the long run.
     pub remembered: f32,
+    /// Angular impulse against twisting and rolling.
+    pub resisted: [f32; 3],
 }
 
 /// What the slot remembers of one point.
@@ -29,7 +31,7 @@ pub fn store_memory(manifold: &Manifold, solved: &Solved) -> ManifoldMemory {
     let used = |point: usize| if point < manifold.count as usize { solved.totals[point] } else { [0.0; 3] };
     ManifoldMemory {
         remembered: solved.remembered * manifold.count as f32,
+        resisted: solved.resisted,
         totals: std::array::from_fn(used),
-        ..ManifoldMemory::default()
     }
 }
