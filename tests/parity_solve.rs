@@ -27,6 +27,7 @@ mod off {
     pub(crate) const INERTIA: Field = ("inverse inertia", 1e-6); // 0
     pub(crate) const SEPARATION: Field = ("separation", 2e-6); // 2.4e-7
     pub(crate) const MASSES: Field = ("masses", 2e-6); // 2.1e-7
+    pub(crate) const BELT: Field = ("belt", 2e-6); // ?
     pub(crate) const APPROACH: Field = ("approach", 5e-6); // 6.9e-7
     // A gap is divided by the sub-step, 240 to the second: its last bit is 3e-5 m/s. Velocities, impulses, approach.
     // 3.5e-5 3.1e-5 6.3e-6
@@ -50,7 +51,7 @@ fn check_solver(
 ) {
     floats.check(what, velocity, (cpu.0, gpu.0), |b| b.linear_velocity);
     floats.check(what, velocity, (cpu.0, gpu.0), |b| b.angular_velocity);
-    let fixed = |head: &ConstraintHead| ConstraintHead { remembered: 0.0, ..*head };
+    let fixed = |head: &ConstraintHead| ConstraintHead { remembered: 0.0, resisted: [0.0; 3], ..*head };
     assert!(cpu.1.heads.iter().map(fixed).eq(gpu.1.heads.iter().map(fixed)), "{what}: heads");
     for of in [|b: &SolverBody| b.linear_start, |b: &SolverBody| b.angular_start] {
         floats.check(what, velocity, (cpu.0, gpu.0), of);
@@ -61,6 +62,15 @@ fn check_solver(
         side.heads.iter().enumerate().map(|(c, head)| head.remembered / first_mass(c)).collect()
     };
     floats.check(what, impulse, (&kept(cpu.1), &kept(gpu.1)), |x| [*x]);
+    let turned = |side: &PlainRows| -> Vec<[f32; 3]> {
+        let inertias = |head: &ConstraintHead| [head.twisting_inertia, head.rolling_inertia, head.rolling_inertia];
+        let change = |head: &ConstraintHead| {
+            let inertias = inertias(head);
+            std::array::from_fn(|k| head.resisted[k] / inertias[k].max(1e-3))
+        };
+        side.heads.iter().map(change).collect()
+    };
+    floats.check(what, impulse, (&turned(cpu.1), &turned(gpu.1)), |x| *x);
     // Impulses as the changes of velocity that they are at their points.
     let mass: Vec<f32> = used(&cpu.1.heads, &cpu.1.points).iter().map(|p| p.normal_mass.max(1e-3)).collect();
     let impulses = [used(&cpu.1.heads, &cpu.1.impulses), used(&cpu.1.heads, &gpu.1.impulses)];
@@ -106,7 +116,20 @@ fn prepare_builds_the_mirrors_rows() {
             floats.check(&what, off::INERTIA, both, |b| b.inverse_inertia_diagonal);
             floats.check(&what, off::INERTIA, both, |b| b.inverse_inertia_off);
 
-            assert!(stage.rows.heads == rows.heads, "{what}: heads");
+            let told = |head: &ConstraintHead| ConstraintHead {
+                rolling_inertia: 0.0,
+                twisting_inertia: 0.0,
+                surface_velocity: [0.0; 2],
+                ..*head
+            };
+            assert!(stage.rows.heads.iter().map(told).eq(rows.heads.iter().map(told)), "{what}: heads");
+            let both = (&stage.rows.heads[..], &rows.heads[..]);
+            floats.check(&what, off::MASSES, both, |head| [head.rolling_inertia, head.twisting_inertia]);
+            floats.check(&what, off::BELT, both, |head| head.surface_velocity);
+            let busy = |head: &&ConstraintHead| head.rolling_inertia > 0.0 && head.resisted != [0.0; 3];
+            let belts = stage.rows.heads.iter().filter(|head| head.surface_velocity != [0.0; 2]).count();
+            let resisting = stage.rows.heads.iter().filter(busy).count();
+            assert!(rows.heads.len() < 300 || (belts > 20 && resisting > 20), "{what}: {belts}, {resisting}");
             let heads = &rows.heads;
             assert!(used(heads, &rows.impulses) == used(heads, &stage.rows.impulses), "{what}: impulses");
             let both = (&used(heads, &stage.rows.points)[..], &used(heads, &rows.points)[..]);
@@ -281,6 +304,7 @@ fn a_bad_body_harms_no_other() {
     let mut mute = stage.rows.clone();
     for (c, head) in mute.heads.iter_mut().enumerate().filter(|(_, head)| touching(head)) {
         (head.friction, head.mass_scale, head.impulse_scale) = (0.0, 0.0, 0.0);
+        (head.rolling_inertia, head.twisting_inertia, head.resisted) = (0.0, 0.0, [0.0; 3]);
         mute.points[4 * c..][..4].iter_mut().for_each(|p| (p.normal_mass, p.tangent_mass) = (0.0, 0.0));
         mute.impulses[4 * c..][..4].iter_mut().for_each(|i| (i.normal, i.tangent) = (0.0, [0.0; 2]));
     }

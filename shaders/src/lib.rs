@@ -60,6 +60,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("solver/passes", include_str!("../solver/passes.wgsl")),
     ("solver/prepare", include_str!("../solver/prepare.wgsl")),
     ("solver/push", include_str!("../solver/push.wgsl")),
+    ("solver/resist", include_str!("../solver/resist.wgsl")),
     ("solver/soft", include_str!("../solver/soft.wgsl")),
     ("solver/store", include_str!("../solver/store.wgsl")),
 ];
