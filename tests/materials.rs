@@ -105,29 +105,30 @@ fn spin_ends_when_the_torque_has_taken_it() {
     });
 }
 
-/// Oracle: without resistance the same column falls; with it the force goes through the middle half of every contact.
+/// Oracle: without resistance the same column falls; with it the force goes through the middle fifth of every ball. Soft
+/// contacts sink by their springs (analysis in docs of `Soft`): 6 cm here.
 #[test]
 fn a_column_of_balls_stands() {
     on_all(|by, make| {
         let scene = scenes::ball_column(30, 0.1);
-        let start: Vec<_> = scene.bodies().map(|b| scene.body(b).unwrap().translation).collect();
-        let bodies: Vec<_> = scene.bodies().collect();
+        let bodies: Vec<_> = scene.bodies().skip(1).collect();
+        let start: Vec<_> = bodies.iter().map(|&b| scene.body(b).unwrap().translation).collect();
         let mut world = make(scene.clone());
-        steps(&mut world, 600);
+        steps(&mut world, 1200);
         let (poses, velocities) = (world.poses().unwrap(), world.velocities().unwrap());
         let moved = bodies.iter().zip(&start).map(|(&b, &s)| poses[b].translation - s);
         let drift = moved.clone().map(|m| m.x.hypot(m.z)).fold(0.0, f32::max);
         let sink = moved.map(|m| -m.y).fold(0.0, f32::max);
         let speed = bodies.iter().map(|&b| speeds(&velocities, b)[0]).fold(0.0, f32::max);
-        let overlap = measures::penetration(&scene, &poses).max_m;
-        row("30 balls, 10 s: sink, m", by, sink, 0.0, 0.9);
-        row("  sideways drift, m", by, drift, 0.0, 0.9);
-        row("  speed left, m/s", by, speed, 0.0, 9e-1);
-        row("  deepest overlap, m", by, overlap as f32, 0.0, 0.9);
+        let soft = by.contains("soft");
+        row("30 balls, 20 s: sink, m", by, sink, 0.0, if soft { 0.07 } else { 1e-3 });
+        row("  deepest overlap, m", by, measures::penetration(&scene, &poses).max_m as f32, 0.0, 5e-3);
+        row("  sideways drift, m", by, drift, 0.0, 5e-3);
+        row("  speed left, m/s", by, speed, 0.0, 1e-3);
         let mut world = make(scenes::ball_column(30, 0.0));
         steps(&mut world, 600);
-        let top = world.poses().unwrap()[bodies[30]].translation.y;
-        assert!(top < 15.0, "{by}: without resistance it falls too, but its top is at {top} m");
+        let top = world.poses().unwrap()[bodies[29]].translation.y;
+        assert!(top < 15.0, "{by}: without resistance it stands too, its top at {top} m");
     });
 }
 
@@ -172,7 +173,9 @@ fn edits_bring_materials() {
         let mut later = side.world(&Scene::new(), &Params::default());
         later.edit().insert(below(), floor()).unwrap();
         later.edit().insert(thrown(), ball()).unwrap();
-        [&mut first, &mut later].map(|world| steps(world, 60));
+        for world in [&mut first, &mut later] {
+            steps(world, 60);
+        }
         assert_eq!(worlds::hash(&mut first), worlds::hash(&mut later), "{side:?}");
         let body = first.scene().bodies().nth(1).unwrap();
         let [linear, _] = speeds(&first.velocities().unwrap(), body);

@@ -3,6 +3,9 @@
 
 //#import solver/push.wgsl
 
+// How far a visit goes, 1 being where the turning would end.
+const OVERSHOOT: f32 = 1.3;
+
 // Angular impulses about the normal and the two tangents, as one.
 fn about(head: ConstraintHead, t: mat2x3<f32>, impulse: vec3<f32>) -> vec3<f32> {
     return impulse.x * head.normal + impulse.y * t[0] + impulse.z * t[1];
@@ -25,6 +28,23 @@ fn warm_start_resistance(
     }
 }
 
+// Brings the angular impulse from `before` to `after`, where that is finite; what it is then.
+fn push_turning(
+    head: ConstraintHead,
+    t: mat2x3<f32>,
+    before: vec3<f32>,
+    after: vec3<f32>,
+    a: ptr<function, SolverBody>,
+    b: ptr<function, SolverBody>,
+) -> vec3<f32> {
+    let push = about(head, t, after - before);
+    if !is_finite3(push) {
+        return before;
+    }
+    turn_by(a, b, push);
+    return after;
+}
+
 // Against relative turning, up to what `sum`, the normal impulse of all points, allows. The impulse after it.
 fn resist(
     head: ConstraintHead,
@@ -33,14 +53,18 @@ fn resist(
     a: ptr<function, SolverBody>,
     b: ptr<function, SolverBody>,
 ) -> vec3<f32> {
-    let turn = (*b).angular_velocity - (*a).angular_velocity;
-    var twist = head.resisted.x - head.twisting_inertia * dot(head.normal, turn);
-    var x = head.resisted.y - head.rolling_inertia * dot(t[0], turn);
-    var y = head.resisted.z - head.rolling_inertia * dot(t[1], turn);
+    let before = head.resisted;
+    let spin = dot(head.normal, (*b).angular_velocity - (*a).angular_velocity);
+    var twist = before.x - OVERSHOOT * head.twisting_inertia * spin;
     let most_twist = head.twisting_resistance * sum;
     if abs(twist) > most_twist {
         twist *= most_twist / abs(twist);
     }
+    let twisted = push_turning(head, t, before, vec3<f32>(twist, before.yz), a, b);
+
+    let turn = (*b).angular_velocity - (*a).angular_velocity;
+    var x = before.y - OVERSHOOT * head.rolling_inertia * dot(t[0], turn);
+    var y = before.z - OVERSHOOT * head.rolling_inertia * dot(t[1], turn);
     let size = sqrt(x * x + y * y);
     let most = head.rolling_resistance * sum;
     if size > most {
@@ -48,11 +72,5 @@ fn resist(
         x *= scale;
         y *= scale;
     }
-    let after = vec3<f32>(twist, x, y);
-    let push = about(head, t, after - head.resisted);
-    if !is_finite3(push) {
-        return head.resisted;
-    }
-    turn_by(a, b, push);
-    return after;
+    return push_turning(head, t, twisted, vec3<f32>(twisted.x, x, y), a, b);
 }

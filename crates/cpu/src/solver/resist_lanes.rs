@@ -2,6 +2,7 @@
 //! of which none resists are passed by.
 
 use super::lanes::{BodyLanes, HeadLanes, Lane, PointLanes, V3};
+use super::resist::OVERSHOOT;
 
 /// Applies the angular impulses of the last visit.
 #[inline(always)]
@@ -25,30 +26,43 @@ fn resist_group(head: &mut HeadLanes, points: &[PointLanes], a: &mut BodyLanes, 
     for p in points {
         sum += p.normal;
     }
+    let overshoot = Lane::splat(OVERSHOOT);
+    let [before, x0, y0] = head.resisted;
     let turn = b.angular - a.angular;
-    let before = head.resisted;
-    let twist = before[0] - head.twisting_inertia * head.normal.dot(turn);
-    let x = before[1] - head.rolling_inertia * head.tangents[0].dot(turn);
-    let y = before[2] - head.rolling_inertia * head.tangents[1].dot(turn);
-    let most_twist = head.twisting_resistance * sum;
-    let twist = twist * twist.abs().simd_gt(most_twist).bitselect(most_twist / twist.abs(), Lane::ONE);
+    let twist = before - overshoot * head.twisting_inertia * head.normal.dot(turn);
+    let most = head.twisting_resistance * sum;
+    let scale = twist.abs().simd_gt(most).bitselect(most / twist.abs(), Lane::ONE);
+    push(head, [twist * scale, x0, y0], a, b);
+
+    let turn = b.angular - a.angular;
+    let x = x0 - overshoot * head.rolling_inertia * head.tangents[0].dot(turn);
+    let y = y0 - overshoot * head.rolling_inertia * head.tangents[1].dot(turn);
     let length = (x * x + y * y).sqrt();
     let most = head.rolling_resistance * sum;
     let scale = length.simd_gt(most).bitselect(most / length, Lane::ONE);
-    let (x, y) = (x * scale, y * scale);
-    let push = about(head, [twist - before[0], x - before[1], y - before[2]]);
-    let good = push.x.is_finite() & push.y.is_finite() & push.z.is_finite();
-    let push = V3::new(good & push.x, good & push.y, good & push.z);
-    head.resisted = [good.bitselect(twist, before[0]), good.bitselect(x, before[1]), good.bitselect(y, before[2])];
-    turn_by(head, a, b, push);
+    push(head, [head.resisted[0], x * scale, y * scale], a, b);
 }
 
+/// Brings the angular impulses to `after`, where that is finite.
+#[inline(always)]
+fn push(head: &mut HeadLanes, after: [Lane; 3], a: &mut BodyLanes, b: &mut BodyLanes) {
+    let before = head.resisted;
+    let push = about(head, [after[0] - before[0], after[1] - before[1], after[2] - before[2]]);
+    let good = push.x.is_finite() & push.y.is_finite() & push.z.is_finite();
+    for ((to, after), before) in head.resisted.iter_mut().zip(after).zip(before) {
+        *to = good.bitselect(after, before);
+    }
+    turn_by(head, a, b, V3::new(good & push.x, good & push.y, good & push.z));
+}
+
+#[inline(always)]
 fn about(head: &HeadLanes, [twist, x, y]: [Lane; 3]) -> V3 {
     let [t1, t2] = head.tangents;
     twist * head.normal + x * t1 + y * t2
 }
 
 /// Lanes that resist nothing keep their velocity to the sign of a zero.
+#[inline(always)]
 fn turn_by(head: &HeadLanes, a: &mut BodyLanes, b: &mut BodyLanes, push: V3) {
     let resists = head.rolling_resistance.simd_gt(Lane::ZERO) | head.twisting_resistance.simd_gt(Lane::ZERO);
     let only = |new: V3, old: V3| {
