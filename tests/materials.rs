@@ -98,15 +98,15 @@ fn spin_ends_when_the_torque_has_taken_it() {
             let velocities = world.velocities().unwrap();
             let exact = spin - slows(arm) * half as f32 * DT;
             row(&format!("spinning {name}, rad/s half way"), by, velocities[body].angular.y, exact, 0.01 * spin);
-            steps(&mut world, half + 6);
-            done = 2 * half + 6;
+            steps(&mut world, half + 12);
+            done = 2 * half + 12;
             row("  at rest, rad/s", by, speeds(&world.velocities().unwrap(), body)[1], 0.0, 1e-4);
         }
     });
 }
 
 /// Oracle: without resistance the same column falls; with it the force goes through the middle fifth of every ball. Soft
-/// contacts sink by their springs (analysis in docs of `Soft`): 6 cm here.
+/// contacts sink by load / (mass (2 pi f)²) each, 6 cm in all here. Without overshoot the one pass drifts by 14 mm.
 #[test]
 fn a_column_of_balls_stands() {
     on_all(|by, make| {
@@ -114,22 +114,23 @@ fn a_column_of_balls_stands() {
         let bodies: Vec<_> = scene.bodies().skip(1).collect();
         let start: Vec<_> = bodies.iter().map(|&b| scene.body(b).unwrap().translation).collect();
         let mut world = make(scene.clone());
-        steps(&mut world, 1200);
+        steps(&mut world, 600);
         let (poses, velocities) = (world.poses().unwrap(), world.velocities().unwrap());
         let moved = bodies.iter().zip(&start).map(|(&b, &s)| poses[b].translation - s);
         let drift = moved.clone().map(|m| m.x.hypot(m.z)).fold(0.0, f32::max);
         let sink = moved.map(|m| -m.y).fold(0.0, f32::max);
         let speed = bodies.iter().map(|&b| speeds(&velocities, b)[0]).fold(0.0, f32::max);
         let soft = by.contains("soft");
-        row("30 balls, 20 s: sink, m", by, sink, 0.0, if soft { 0.07 } else { 1e-3 });
+        row("30 balls, 10 s: sink, m", by, sink, 0.0, if soft { 0.07 } else { 1e-3 });
         row("  deepest overlap, m", by, measures::penetration(&scene, &poses).max_m as f32, 0.0, 5e-3);
         row("  sideways drift, m", by, drift, 0.0, 5e-3);
         row("  speed left, m/s", by, speed, 0.0, 1e-3);
-        let mut world = make(scenes::ball_column(30, 0.0));
-        steps(&mut world, 600);
-        let top = world.poses().unwrap()[bodies[29]].translation.y;
-        assert!(top < 15.0, "{by}: without resistance it stands too, its top at {top} m");
     });
+    let scene = scenes::ball_column(30, 0.0);
+    let mut world = worlds::Side::Cpu.world(&scene, &Params::default());
+    steps(&mut world, 600);
+    let top = world.poses().unwrap()[scene.bodies().last().unwrap()].translation.y;
+    assert!(top < 15.0, "without resistance it stands too, its top at {top} m");
 }
 
 /// Oracle: friction pulls with mu g until the box goes as fast as the belt.
