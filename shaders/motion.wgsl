@@ -4,7 +4,7 @@
 //   integrate_velocities   velocities in `solver_bodies`, from `work_states` (forces) and `props`
 //   integrate_positions    translation and delta there
 //   first_substep, next_substep, last_substep   both, as one pass wants it
-//   commit                 `states` from `solver_bodies` and `work_states`; counts and names bodies in quarantine
+//   commit                 `states` from `solver_bodies`, `shares` and `work_states`; counts and names bodies in quarantine
 //   write_poses            `poses`, the bodies' own frames for users and renderers, from `states` and `props`
 //
 // Rotation by the implicit midpoint rule with Cayley's map: Simo and Wong, "Unconditionally Stable Algorithms for Rigid
@@ -33,6 +33,7 @@ const COUNTER_FROZEN_COUNT: u32 = 108u; // scratch word of the counters
 @group(0) @binding(4) var<storage, read_write> solver_bodies: array<SolverBody>;
 @group(0) @binding(5) var<storage, read_write> states: array<BodyState>;
 @group(0) @binding(6) var<storage, read_write> poses: array<PoseRecord>;
+@group(0) @binding(8) var<storage, read> shares: array<u32>;
 @group(0) @binding(7) var<storage, read_write> counters: array<atomic<u32>>;
 
 // Acceleration by gravity and force, m/s².
@@ -263,7 +264,8 @@ fn commit(
     state.torque = vec3<f32>();
     if (state.flags & BODY_KIND) != BODY_NONE && (state.flags & BODY_FROZEN) == 0u {
         let body = solver_bodies[i];
-        let position = state.position + body.translation;
+        // Its way, or as much of it as leads into nothing that stands still (`continuous`).
+        let position = state.position + body.translation * bitcast<f32>(shares[i]);
         let good = small(position) && small(body.linear_velocity) && small(body.angular_velocity)
             && is_finite4(body.delta);
         if good {

@@ -92,10 +92,10 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             surface_velocity, twisting_inertia, pad_a
         }
         ConstraintPoint {
-            anchor, adjusted_separation, normal_mass, tangent_mass, approach, pad_a, total, pad_b
+            anchor, adjusted_separation, normal_mass, tangent_mass, approach, deviation, total, pad_b
         }
         Impulse { normal, tangent, feature }
-        ManifoldMemory { remembered, resisted, totals }
+        ManifoldMemory { remembered, resisted, deviations, totals }
         Control {
             stop, overflow, needed, step, old_pair_count, free_count, colored_as, frozen_count, pair_count, processed,
             new_count, dead_count, constraint_count, point_count, batch_count, rounds, unplaced, last_count,

@@ -33,6 +33,7 @@ mod off {
     pub(crate) const TURN: Field = ("turn", 1e-5); // 1.2e-6
     pub(crate) const TURNED: Field = ("turned velocity", 1e-5); // 8.9e-7
     pub(crate) const EIGENVALUE: Field = ("eigenvalue", 1e-4);
+    pub(crate) const SHARE: Field = ("share", 1e-5);
     pub(crate) const ROTATION: Field = ("rotation", 1e-6); // 1.2e-7
     pub(crate) const POSE: Field = ("pose", 1e-6); // 1.2e-7
 }
@@ -126,6 +127,8 @@ fn the_result_becomes_the_state() {
         for (permute, alone) in alones.iter_mut().enumerate() {
             let what = format!("{what}, permuted {permute}");
             stage.put(alone, 8);
+            let shares: Vec<f32> = (0..stage.bodies.len()).map(|i| if i % 5 == 2 { 0.25 } else { 1.0 }).collect();
+            alone.put("shares", &shares);
             let groups = stage.by_body();
             alone.run(|chain| {
                 chain.pass("motion", "commit", groups);
@@ -135,7 +138,7 @@ fn the_result_becomes_the_state() {
             let mut counters: Vec<u32> = bytemuck::cast_slice(&[stage.control]).to_vec();
             let mut states = Vec::new();
             for (i, (body, state)) in stage.bodies.iter().zip(&stage.frame.states).enumerate() {
-                let (state, bad) = motion::commit(body, state);
+                let (state, bad) = motion::commit(body, state, shares[i]);
                 let frozen = state.flags & body_flags::FROZEN != 0 && state.flags & body_flags::KIND != 0;
                 counters[FROZEN_COUNT] += u32::from(frozen);
                 if bad {
@@ -158,4 +161,31 @@ fn the_result_becomes_the_state() {
         }
     }
     eprintln!("commit\n{floats}");
+}
+
+/// Which ways are cut short, and where. Oracle: the mirror.
+#[test]
+fn ways_are_cut_short_alike() {
+    let mut alones = PERMUTATIONS.map(Alone::new);
+    let mut floats = Floats::default();
+    let mut cut = 0;
+    for (what, mut stage) in Stage::all() {
+        stage.advance();
+        // So far that many come to a wall.
+        for (i, body) in stage.bodies.iter_mut().enumerate() {
+            let far = [0.0, 0.3, 2.0, 40.0, f32::NAN, f32::INFINITY][i % 6];
+            body.translation = [far, -1.3 * far, 0.4 * far * if i % 2 == 0 { 1.0 } else { -1.0 }];
+        }
+        let shares = stage.cpu.shares(&stage.frame, &stage.bodies);
+        cut += shares.iter().filter(|share| **share < 1.0).count();
+        for (permute, alone) in alones.iter_mut().enumerate() {
+            stage.put(alone, 8);
+            alone.put("shares", &vec![1f32; shares.len()]);
+            alone.run(|chain| chain.pass("continuous", "shorten", stage.control.pair_count.div_ceil(256) + 1));
+            let gpu: Vec<f32> = alone.take("shares");
+            floats.check(&format!("{what}, permuted {permute}"), off::SHARE, (&shares, &gpu), |share| [*share]);
+        }
+    }
+    eprintln!("continuous\n{floats}");
+    assert!(cut > 100, "{cut}");
 }

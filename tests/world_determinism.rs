@@ -129,7 +129,9 @@ type Outcome = (Vec<SolverBody>, Vec<Vec<[u32; 3]>>);
 
 fn all_bits(solved: &Solved, points: usize) -> Vec<[u32; 3]> {
     let impulses = solved.impulses[..points].iter().map(|(normal, [x, y])| [*normal, *x, *y]);
-    let rest = solved.totals[..points].iter().copied().chain([[solved.remembered, 0.0, 0.0], solved.resisted]);
+    let deviations = solved.deviations[..points].iter().map(|d| [*d, 0.0, 0.0]);
+    let memory = deviations.chain([[solved.remembered, 0.0, 0.0], solved.resisted]);
+    let rest = solved.totals[..points].iter().copied().chain(memory);
     impulses.chain(rest).map(|three| three.map(f32::to_bits)).collect()
 }
 

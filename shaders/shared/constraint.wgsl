@@ -30,7 +30,7 @@ struct ConstraintPoint {
     normal_mass: f32,
     tangent_mass: f32,
     approach: f32,
-    pad_a: u32,
+    deviation: f32,
     total: vec3<f32>,
     pad_b: u32,
 }
@@ -45,6 +45,7 @@ struct Impulse {
 struct ManifoldMemory {
     remembered: f32,
     resisted: array<f32, 3>,
+    deviations: array<f32, 4>,
     totals: array<array<f32, 3>, 4>,
 }
 

@@ -5,6 +5,8 @@
 
 // Share of the memory that is left, each sub-step, of a contact that does not push.
 const FADE: f32 = 0.9;
+// What a point has more or less than the mean is remembered at this times the square of the mean's rate.
+const DEVIATION: f32 = 2.5;
 
 fn over(square: f32, mass: f32) -> f32 {
     if mass > 0.0 {
@@ -48,12 +50,13 @@ fn pass_normal(
     let velocity = dot(normal, relative_velocity(a, b, r[0], r[1]));
     let separation = separation_of(head, point, a, b);
     let mass = (*point).normal_mass;
-    let pressed = (*impulse).normal > 0.0 && separation * mass < step.memory_band * head.remembered;
+    let remembered = head.remembered + (*point).deviation;
+    let pressed = (*impulse).normal > 0.0 && separation * mass < step.memory_band * remembered;
     var change = 0.0;
     if separation > 0.0 && !pressed {
         change = -mass * (velocity + separation * step.inverse_h);
     } else {
-        let leak = head.impulse_scale * ((*impulse).normal - head.remembered);
+        let leak = head.impulse_scale * ((*impulse).normal - remembered);
         let spring = head.mass_scale * mass * head.bias_rate * separation;
         let pull = max(spring + leak, -step.push_speed * mass);
         change = -(head.mass_scale * mass * velocity + pull);
@@ -72,21 +75,27 @@ fn pass_normal(
     }
 }
 
-// The memory follows the mean impulse of the points, whose sum is `sum`.
-fn remember(
-    head: ConstraintHead,
-    sum: f32,
-    a: ptr<function, SolverBody>,
-    b: ptr<function, SolverBody>,
-    step: StepParams,
-) -> f32 {
-    let mean = sum / f32(head.count);
+// How fast memory follows, a sub-step.
+fn memory_rate(a: ptr<function, SolverBody>, b: ptr<function, SolverBody>, step: StepParams) -> f32 {
     let own = eigenvalues(a, b);
-    let rate = min(step.memory_gain * (own.x + own.y), step.memory_limit);
+    return min(step.memory_gain * (own.x + own.y), step.memory_limit);
+}
+
+// The memory of the mean follows that of the impulses.
+fn remember(remembered: f32, mean: f32, rate: f32) -> f32 {
     if mean > 0.0 {
-        return head.remembered + rate * (mean - head.remembered);
+        return remembered + rate * (mean - remembered);
     }
-    return FADE * head.remembered;
+    return FADE * remembered;
+}
+
+// A point's deviation from the mean follows that of its impulse; `remembered` is the new mean.
+fn deviate(deviation: f32, remembered: f32, normal: f32, mean: f32, rate: f32) -> f32 {
+    let own = max(remembered + deviation + DEVIATION * rate * rate * (normal - mean - deviation), 0.0);
+    if normal > 0.0 {
+        return own - remembered;
+    }
+    return FADE * min(own, remembered) - remembered;
 }
 
 // Counts `push` to what the sub-step began with.

@@ -179,6 +179,10 @@ fn pass_over(c: u32) {
             break if p >= end;
         }
     }
+    let mean = sum / f32(head.count);
+    let rate = memory_rate(&a, &b, step);
+    let remembered = remember(head.remembered, mean, rate);
+    heads[c].remembered = remembered;
     var blown = false;
     p = first;
     loop {
@@ -186,6 +190,7 @@ fn pass_over(c: u32) {
         var impulse = impulses[p];
         push_tangent(head, t, &point, &impulse, &a, &b);
         points[p].total = count(&point, &impulse);
+        points[p].deviation = deviate(point.deviation, remembered, impulse.normal, mean, rate);
         let was = before[p - first];
         let blow = impulse.normal - was.x;
         if blow > step.blow_speed * point.normal_mass {
@@ -206,7 +211,6 @@ fn pass_over(c: u32) {
     if resists(head) {
         heads[c].resisted = resist(head, t, sum, &a, &b);
     }
-    heads[c].remembered = remember(head, sum, &a, &b, step);
     if a.inverse_mass > 0.0 {
         solver_bodies[head.body_a].linear_velocity = a.linear_velocity;
         solver_bodies[head.body_a].angular_velocity = a.angular_velocity;

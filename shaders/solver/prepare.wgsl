@@ -1,8 +1,9 @@
 // Builds the step's solver bodies and constraint rows. Twin of crates/cpu/src/solver/prepare.rs.
 //
-//   bodies        one thread a body: `solver_bodies` from `work_states`, `props` and `masks` (the batches it is in)
-//   constraints   one thread a constraint, in batch order: `heads` and `points` from the manifold of its pair; belts turn as in
-//                 `work_states`
+//   bodies        one thread a body: `solver_bodies` from `work_states`, `props` and `masks` (the batches it is in); all of
+//                 its way in `shares`
+//   constraints   one thread a constraint, in batch order: `heads` and `points` from the manifold of its pair;
+//                 belts turn as in `work_states`
 //   carry         the same: `impulses`, those of `slot_impulses` for points whose features stayed; `slot_memory`
 //
 // The masses that a point sees are as in Catto, "Iterative Dynamics with Temporal Coherence" (GDC 2005).
@@ -18,6 +19,7 @@
 //#import shared/thread.wgsl
 
 const NO_FEATURE: u32 = 0xffffffffu;
+const NO_RADIUS: f32 = 1e30; // m: more than any
 
 @group(0) @binding(0) var<uniform> control: Control;
 @group(0) @binding(1) var<uniform> step: StepParams;
@@ -33,6 +35,7 @@ const NO_FEATURE: u32 = 0xffffffffu;
 @group(0) @binding(11) var<storage, read_write> heads: array<ConstraintHead>;
 @group(0) @binding(12) var<storage, read_write> points: array<ConstraintPoint>;
 @group(0) @binding(13) var<storage, read_write> impulses: array<Impulse>;
+@group(0) @binding(15) var<storage, read_write> shares: array<u32>;
 @group(0) @binding(14) var<storage, read> slot_memory: array<ManifoldMemory>;
 
 // A body as the solver moves it; what nothing may push has no mass and keeps its velocity.
@@ -68,6 +71,7 @@ fn bodies(
         return;
     }
     solver_bodies[i] = prepare_body(i);
+    shares[i] = bitcast<u32>(1.0);
 }
 
 // Coefficient of two colliders by the stronger of their rules (`CombineRule`).
@@ -139,7 +143,7 @@ fn radius_of(collider: u32, ball: bool) -> f32 {
     if colliders[collider].shape == SHAPE_CUBOID && !ball {
         return min(min(size.x, size.y), size.z);
     }
-    return 3.4028235e38;
+    return NO_RADIUS;
 }
 
 // Change of relative angular velocity about `v` by a unit angular impulse about `u`.
@@ -185,7 +189,7 @@ fn constraints(
             inverse(response(a, b, ra, rb, normal, normal)),
             inverse(stiffest),
             dot(normal, dv),
-            0u,
+            0.0,
             vec3<f32>(),
             0u,
         );
@@ -263,11 +267,10 @@ fn carry(
         slot_impulses[first + 3u].feature,
     );
     if !fresh && stored.x != NO_FEATURE {
-        let memory = slot_memory[next_pairs[index].slot];
-        heads[c].remembered = memory.remembered / f32(manifolds[index].count);
-        if resists(heads[c]) {
-            heads[c].resisted = vec3<f32>(memory.resisted[0], memory.resisted[1], memory.resisted[2]);
-        }
+        let slot = next_pairs[index].slot;
+        heads[c].remembered = slot_memory[slot].remembered / f32(manifolds[index].count);
+        let resisted = slot_memory[slot].resisted;
+        heads[c].resisted = vec3<f32>(resisted[0], resisted[1], resisted[2]);
     }
     for (var i = 0u; i < min(manifolds[index].count, 4u); i++) {
         var impulse: Impulse;
@@ -277,6 +280,7 @@ fn carry(
             // The last that is the same, though no two should be.
             let k = select(select(select(0u, 1u, same.y), 2u, same.z), 3u, same.w);
             impulse = slot_impulses[first + k];
+            points[4u * c + i].deviation = slot_memory[next_pairs[index].slot].deviations[k];
         }
         impulses[4u * c + i] = impulse;
     }

@@ -34,6 +34,7 @@ fn store(
     memory.resisted = array<f32, 3>(resisted.x, resisted.y, resisted.z);
     for (var i = 0u; i < min(count, 4u); i++) {
         let total = points[4u * c + i].total;
+        memory.deviations[i] = points[4u * c + i].deviation;
         memory.totals[i] = array<f32, 3>(total.x, total.y, total.z);
     }
     slot_memory[slot] = memory;

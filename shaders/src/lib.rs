@@ -16,6 +16,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("broadphase/lbvh/walk", include_str!("../broadphase/lbvh/walk.wgsl")),
     ("broadphase/pairs", include_str!("../broadphase/pairs.wgsl")),
     ("broadphase/sweep", include_str!("../broadphase/sweep.wgsl")),
+    ("continuous", include_str!("../continuous.wgsl")),
     ("contact", include_str!("../contact.wgsl")),
     ("edit", include_str!("../edit.wgsl")),
     ("motion", include_str!("../motion.wgsl")),

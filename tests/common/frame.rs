@@ -1,7 +1,5 @@
 //! One step on the CPU, pass by pass, so that a test can take what any pass reads and what it should write.
 
-use std::iter;
-
 use bytemuck::Zeroable;
 use tumble_core::glam::Vec3;
 use tumble_core::layout::*;
@@ -11,7 +9,7 @@ use tumble_cpu::broadphase::{Boxes, brute_force};
 use tumble_cpu::contact::{self, Matched, NO_FEATURE};
 use tumble_cpu::solver::prepare::{Contact, prepare_body, prepare_constraint};
 use tumble_cpu::solver::{Bodies, PlainRows, solve_plain, store};
-use tumble_cpu::{bounds, motion, narrowphase};
+use tumble_cpu::{bounds, continuous, motion, narrowphase};
 
 /// What lives from step to step.
 pub(crate) struct Cpu {
@@ -192,6 +190,16 @@ impl Cpu {
         memory
     }
 
+    /// The share of its way that each body may go.
+    pub(crate) fn shares(&self, frame: &Frame, bodies: &[SolverBody]) -> Vec<f32> {
+        let mut shares = vec![1f32; bodies.len()];
+        let short = |pair| continuous::share(pair, &self.colliders, &frame.states, bodies);
+        for (body, share) in frame.matched.pairs.iter().filter_map(short) {
+            shares[body as usize] = shares[body as usize].min(share);
+        }
+        shares
+    }
+
     /// Solves the step and keeps its result.
     pub(crate) fn commit(&mut self, frame: &Frame) {
         let mut bodies = self.bodies(frame);
@@ -211,7 +219,9 @@ impl Cpu {
         }
         self.impulses = self.stored(frame, &rows);
         self.memory = self.remembered(frame, &rows);
-        self.states = iter::zip(&bodies, &frame.states).map(|(b, s)| motion::commit(b, s).0).collect();
+        let shares = self.shares(frame, &bodies);
+        let ends = bodies.iter().zip(&frame.states).zip(&shares);
+        self.states = ends.map(|((body, state), share)| motion::commit(body, state, *share).0).collect();
         self.pairs = frame.matched.pairs.clone();
         self.number += 1;
     }

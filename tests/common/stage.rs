@@ -99,6 +99,7 @@ impl Stage {
         alone.put("slot_impulses", &cpu.impulses);
         alone.put("slot_memory", &cpu.memory);
         alone.put("states", &cpu.states);
+        alone.put("shares", &vec![1f32; cpu.states.len()]);
         alone.put("poses", &vec![PoseRecord::zeroed(); cpu.states.len()]);
         self.put_solver(alone);
     }

@@ -7,6 +7,7 @@ pub mod batch;
 pub mod bounds;
 pub mod broadphase;
 pub mod contact;
+pub mod continuous;
 pub mod edit;
 mod math;
 pub mod motion;

@@ -142,9 +142,9 @@ fn half_turn(w: Vec3, h: f32) -> Quat {
     Quat::from_xyzw(half.x * ratio, half.y * ratio, half.z * ratio, cosine)
 }
 
-/// The state after the step. A result that is not finite is thrown away: the body keeps its pose and is put in
+/// The state after the step, the body having gone `share` of its way (see `continuous`). A result that is not finite is thrown away: the body keeps its pose and is put in
 /// quarantine. Returns the state and whether that happened.
-pub fn commit(body: &SolverBody, state: &BodyState) -> (BodyState, bool) {
+pub fn commit(body: &SolverBody, state: &BodyState, share: f32) -> (BodyState, bool) {
     let mut new = *state;
     new.force = [0.0; 3];
     new.torque = [0.0; 3];
@@ -152,7 +152,7 @@ pub fn commit(body: &SolverBody, state: &BodyState) -> (BodyState, bool) {
         return (new, false);
     }
     let small = |v: [f32; 3]| finite(v) && vec3(v).abs().max_element() <= STATE_LIMIT;
-    let position = (vec3(state.position) + vec3(body.translation)).to_array();
+    let position = (vec3(state.position) + vec3(body.translation) * share).to_array();
     let [x, y, z, w] = body.delta;
     let good = small(position)
         && small(body.linear_velocity)

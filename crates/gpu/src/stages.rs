@@ -72,7 +72,7 @@ impl Stages {
 
         self.solver.record(recorder, buffers, step)?;
         self.contact.record_commit(recorder, buffers)?;
-        self.motion.record_commit(recorder, step)?;
+        self.motion.record_commit(recorder, buffers, step)?;
         self.contact.record_counts(recorder)
     }
 }

@@ -56,12 +56,13 @@ enum Per {
 }
 
 /// Name, bytes of an element, what it follows, whether its content outlives a step.
-const ARRAYS: [(&str, usize, Per, bool); 30] = [
+const ARRAYS: [(&str, usize, Per, bool); 31] = [
     ("states", size_of::<BodyState>(), Per::Body, true),
     ("work_states", size_of::<BodyState>(), Per::Body, false),
     ("props", size_of::<BodyProps>(), Per::Body, true),
     ("poses", size_of::<PoseRecord>(), Per::Body, true),
     ("solver_bodies", size_of::<SolverBody>(), Per::Body, false),
+    ("shares", 4, Per::Body, false),
     ("masks", 8, Per::Body, false),
     ("claims", 4, Per::Body, false),
     ("colliders", size_of::<Collider>(), Per::Collider, true),

@@ -25,7 +25,7 @@ pub struct ConstraintHead {
     pub mass_scale: f32,
     /// Spring: share of the impulse that leaks.
     pub impulse_scale: f32,
-    /// One pass: what a point bears in the long run, mean over the points, N s. Follows their impulses.
+    /// One pass: what the points bear in the long run, on the mean, N s. Follows their impulses.
     pub remembered: f32,
     /// Part of the first body's arm along the normal that does not turn with it, because it is a ball there, m.
     pub round_a: f32,
@@ -66,8 +66,8 @@ pub struct ConstraintPoint {
     pub tangent_mass: f32,
     /// Lowest normal velocity before the first push of the step, m/s.
     pub approach: f32,
-    /// Unused.
-    pub pad_a: u32,
+    /// One pass: what this point bears in the long run more than the mean, N s.
+    pub deviation: f32,
     /// All that was pushed in the step, along the normal and the two tangents, N s.
     pub total: [f32; 3],
     /// Unused.
@@ -86,7 +86,7 @@ pub struct Impulse {
     pub feature: u32,
 }
 
-/// What a slot remembers of its manifold beside the impulses that carry over. 64 bytes.
+/// What a slot remembers of its manifold beside the impulses that carry over. 80 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 pub struct ManifoldMemory {
@@ -94,6 +94,8 @@ pub struct ManifoldMemory {
     pub remembered: f32,
     /// [`ConstraintHead::resisted`].
     pub resisted: [f32; 3],
+    /// [`ConstraintPoint::deviation`] of the points.
+    pub deviations: [f32; 4],
     /// [`ConstraintPoint::total`] of the points in the last step.
     pub totals: [[f32; 3]; 4],
 }

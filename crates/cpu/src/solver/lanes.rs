@@ -85,6 +85,7 @@ pub(crate) struct PointLanes {
     pub(crate) normal_mass: Lane,
     pub(crate) tangent_mass: Lane,
     pub(crate) approach: Lane,
+    pub(crate) deviation: Lane,
     pub(crate) total: [Lane; 3],
     pub(crate) normal: Lane,
     pub(crate) tangent: [Lane; 2],
@@ -170,11 +171,18 @@ impl ConstraintLanes {
         }
     }
 
-    /// Puts a point with its impulse into a lane; masses and the other arm follow for all lanes at once.
-    pub(crate) fn set_point(&mut self, lane: usize, point: usize, at: &ManifoldPoint, impulse: &Impulse) {
+    /// Puts a point with what its slot remembers into a lane; masses and the other arm follow for all lanes at once.
+    pub(crate) fn set_point(
+        &mut self,
+        lane: usize,
+        point: usize,
+        at: &ManifoldPoint,
+        (impulse, deviation): (Impulse, f32),
+    ) {
         let to = &mut self.points[point];
         to.anchor.set(lane, at.anchor);
         set(&mut to.adjusted_separation, lane, at.separation);
+        set(&mut to.deviation, lane, deviation);
         set(&mut to.normal, lane, impulse.normal);
         set(&mut to.tangent[0], lane, impulse.tangent[0]);
         set(&mut to.tangent[1], lane, impulse.tangent[1]);
@@ -209,6 +217,7 @@ impl ConstraintLanes {
             totals: std::array::from_fn(|k| points[k].total.each_ref().map(at)),
             remembered: at(&self.head.remembered),
             resisted: self.head.resisted.each_ref().map(at),
+            deviations: std::array::from_fn(|k| at(&points[k].deviation)),
         }
     }
 }

@@ -130,7 +130,7 @@ impl Rows {
                     manifold.between,
                 );
                 for point in 0..manifold.count as usize {
-                    group.set_point(lane, point, &manifold.points[point], &prepare::carry(&contact, point));
+                    group.set_point(lane, point, &manifold.points[point], prepare::carry(&contact, point));
                 }
             }
             prepare_lanes::prepare(group, rows);
@@ -180,6 +180,7 @@ impl PlainRows {
             totals: std::array::from_fn(|k| points[k].total),
             remembered: self.heads[c].remembered,
             resisted: self.heads[c].resisted,
+            deviations: std::array::from_fn(|k| points[k].deviation),
         }
     }
 

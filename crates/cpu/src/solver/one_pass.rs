@@ -3,8 +3,9 @@
 //! Between sub-steps the bodies alone carry impulses and gravity over (`motion::next_substep`), so that no visit is
 //! spent on a warm start but the first. A contact is a damped spring of `stiffness` mass / h²: the leak that damps it lets
 //! it give way by load h² / (stiffness mass). Here the leak leads not to zero but to a remembered impulse, which follows
-//! the mean impulse of the manifold's points; once it has caught up, nothing gives way. (Per point it would make columns
-//! topple.)
+//! the impulses: the mean over the manifold's points, and much more slowly what each has more or less. Once it has caught
+//! up, nothing gives way. (Were the points quicker, columns would sway and topple: what holds them upright is that an end
+//! which bears more gives way.)
 //!
 //! How fast it may follow: with a rate of less than (1 - stiffness) e / leak the two do not swing, e being the smallest
 //! eigenvalue of D^-1 A, A the matrix of contacts and D its diagonal. For the load as it is, e is no more than the
@@ -23,6 +24,9 @@ use tumble_core::layout::{BodyProps, BodyState, ConstraintHead, ConstraintPoint,
 pub const EASE_MIX: f32 = 0.95;
 /// No eigenvalue of D^-1 A is larger.
 pub const MAX_EIGENVALUE: f32 = 4.0;
+/// What a point has more or less than the mean is remembered at this times the square of the mean's rate, a sub-step: a
+/// twentieth of it at most, and next to nothing where loads are so soft that a column might sway.
+pub const DEVIATION: f32 = 2.5;
 /// Share of the memory that is left, each sub-step, of a contact that does not push.
 pub const FADE: f32 = 0.9;
 
@@ -70,7 +74,7 @@ pub(super) fn pass(
         count(point, impulse);
     }
     resist(head, tangents, impulses, a, b);
-    remember(head, impulses, a, b, step);
+    remember(head, points, impulses, a, b, step);
     for (k, (point, impulse)) in points.iter().zip(impulses).enumerate() {
         // A blow is given once: the next sub-step starts without it.
         let (normal, tangent) = before[k];
@@ -99,11 +103,12 @@ fn push_normal(
     let velocity = normal.dot(relative_velocity(a, b, ra, rb));
     let separation = separation(head, point, a, b);
     let mass = point.normal_mass;
-    let pressed = impulse.normal > 0.0 && separation * mass < step.memory_band * head.remembered;
+    let remembered = head.remembered + point.deviation;
+    let pressed = impulse.normal > 0.0 && separation * mass < step.memory_band * remembered;
     let change = if separation > 0.0 && !pressed {
         -mass * (velocity + separation * step.inverse_h)
     } else {
-        let leak = head.impulse_scale * (impulse.normal - head.remembered);
+        let leak = head.impulse_scale * (impulse.normal - remembered);
         let spring = head.mass_scale * mass * head.bias_rate * separation;
         let pull = (spring + leak).max(-step.push_speed * mass);
         -(head.mass_scale * mass * velocity + pull)
@@ -122,14 +127,27 @@ fn push_normal(
     }
 }
 
-/// The memory follows the mean impulse of the points.
-fn remember(head: &mut ConstraintHead, impulses: &[Impulse], a: &SolverBody, b: &SolverBody, step: &StepParams) {
+/// The memory follows: the mean that of the impulses, and each point's deviation from it theirs.
+fn remember(
+    head: &mut ConstraintHead,
+    points: &mut [ConstraintPoint],
+    impulses: &[Impulse],
+    a: &SolverBody,
+    b: &SolverBody,
+    step: &StepParams,
+) {
     let mean = impulses.iter().map(|i| i.normal).fold(0.0, |sum, normal| sum + normal) / head.count as f32;
     let [from_a, from_b] = eigenvalues(a, b);
     let rate = (step.memory_gain * (from_a + from_b)).min(step.memory_limit);
     let remembered =
         if mean > 0.0 { head.remembered + rate * (mean - head.remembered) } else { FADE * head.remembered };
     head.remembered = remembered;
+    for (point, impulse) in points.iter_mut().zip(impulses) {
+        let more = impulse.normal - mean;
+        let own = (remembered + point.deviation + DEVIATION * rate * rate * (more - point.deviation)).max(0.0);
+        let own = if impulse.normal > 0.0 { own } else { FADE * own.min(remembered) };
+        point.deviation = own - remembered;
+    }
 }
 
 /// The bodies' eigenvalues; one that does not move has the other's.

@@ -1,7 +1,7 @@
 //! The law of `one_pass`, several constraints at a time: the same operations in the same order, so the same results.
 
 use super::lanes::{BodyLanes, ConstraintLanes, HeadLanes, Lane, PointLanes, V3, Weights};
-use super::one_pass::FADE;
+use super::one_pass::{DEVIATION, FADE};
 use super::push_lanes::{apply, arms, count, push_tangent, separation, warm_start};
 use super::resist_lanes::resist;
 use tumble_core::layout::StepParams;
@@ -65,11 +65,12 @@ fn push_normal(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLanes, b: &mut 
     let (normal, [ra, rb], mass) = (head.normal, arms(head, p), p.normal_mass);
     let velocity = normal.dot(b.velocity_at(rb) - a.velocity_at(ra));
     let separation = separation(head, p, a, b);
-    let band = Lane::splat(step.memory_band) * head.remembered;
+    let remembered = head.remembered + p.deviation;
+    let band = Lane::splat(step.memory_band) * remembered;
     let pressed = p.normal.simd_gt(Lane::ZERO) & (separation * mass).simd_lt(band);
     let apart = separation.simd_gt(Lane::ZERO) & !pressed;
     let close = -mass * (velocity + separation * Lane::splat(step.inverse_h));
-    let leak = head.impulse_scale * (p.normal - head.remembered);
+    let leak = head.impulse_scale * (p.normal - remembered);
     let spring = head.mass_scale * mass * head.bias_rate * separation;
     let pull = (spring + leak).fast_max(Lane::splat(-step.push_speed) * mass);
     let press = -(head.mass_scale * mass * velocity + pull);
@@ -85,9 +86,9 @@ fn push_normal(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLanes, b: &mut 
 }
 
 #[inline(always)]
-fn remember(head: &mut HeadLanes, points: &[PointLanes], a: &BodyLanes, b: &BodyLanes, step: &StepParams) {
+fn remember(head: &mut HeadLanes, points: &mut [PointLanes], a: &BodyLanes, b: &BodyLanes, step: &StepParams) {
     let mut sum = Lane::ZERO;
-    for p in points {
+    for p in points.iter() {
         sum += p.normal;
     }
     // A lane without a constraint has no points.
@@ -95,7 +96,16 @@ fn remember(head: &mut HeadLanes, points: &[PointLanes], a: &BodyLanes, b: &Body
     let [from_a, from_b] = eigenvalues(a, b);
     let rate = (Lane::splat(step.memory_gain) * (from_a + from_b)).fast_min(Lane::splat(step.memory_limit));
     let followed = head.remembered + rate * (mean - head.remembered);
-    head.remembered = mean.simd_gt(Lane::ZERO).bitselect(followed, Lane::splat(FADE) * head.remembered);
+    let remembered = mean.simd_gt(Lane::ZERO).bitselect(followed, Lane::splat(FADE) * head.remembered);
+    head.remembered = remembered;
+    for (k, p) in points.iter_mut().enumerate() {
+        let used = head.counts.simd_gt(Lane::splat(k as f32));
+        let more = p.normal - mean;
+        let own = remembered + p.deviation + Lane::splat(DEVIATION) * rate * rate * (more - p.deviation);
+        let own = own.fast_max(Lane::ZERO);
+        let own = p.normal.simd_gt(Lane::ZERO).bitselect(own, Lane::splat(FADE) * own.fast_min(remembered));
+        p.deviation = used & (own - remembered);
+    }
 }
 
 #[inline(always)]

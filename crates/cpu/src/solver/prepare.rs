@@ -89,11 +89,11 @@ pub fn prepare_constraint(
             normal_mass: inverse(along(normal, normal)),
             tangent_mass: inverse(stiffest),
             approach: normal.dot(dv),
-            pad_a: 0,
+            deviation: 0.0,
             total: [0.0; 3],
             pad_b: 0,
         };
-        impulses[i] = carry(contact, i);
+        (impulses[i], points[i].deviation) = carry(contact, i);
     }
     (head, points, impulses)
 }
@@ -155,13 +155,16 @@ pub(super) fn prepare_head(
     head
 }
 
+/// More than any, m.
+const NO_RADIUS: f32 = 1e30;
+
 /// The radius that resistance is a share of: that of the smaller ball; where there is none, the smallest half extent.
 fn lever(a: &Collider, b: &Collider) -> f32 {
     let ball = a.shape == shape_kind::BALL || b.shape == shape_kind::BALL;
     let of = |c: &Collider| match c.shape {
         shape_kind::BALL => c.size[0],
         shape_kind::CUBOID if !ball => c.size[0].min(c.size[1]).min(c.size[2]),
-        _ => f32::MAX,
+        _ => NO_RADIUS,
     };
     of(a).min(of(b))
 }
@@ -181,12 +184,14 @@ fn is_fresh(contact: &Contact<'_>) -> bool {
     contact.pair.kind & pair_kind::FRESH != 0 || contact.stored[0].feature == NO_FEATURE
 }
 
-/// The impulse that the slot remembers for a point whose feature stayed.
-pub(super) fn carry(contact: &Contact<'_>, point: usize) -> Impulse {
+/// What the slot remembers of a point whose feature stayed: its impulse, and what it bears more than the mean.
+pub(super) fn carry(contact: &Contact<'_>, point: usize) -> (Impulse, f32) {
     let feature = contact.manifold.features[point];
     let fresh = contact.pair.kind & pair_kind::FRESH != 0;
-    let stored = contact.stored.iter().rfind(|s| !fresh && s.feature == feature);
-    stored.copied().unwrap_or(Impulse { normal: 0.0, tangent: [0.0; 2], feature })
+    match contact.stored.iter().rposition(|s| !fresh && s.feature == feature) {
+        Some(k) => (contact.stored[k], contact.memory.deviations[k]),
+        None => (Impulse { normal: 0.0, tangent: [0.0; 2], feature }, 0.0),
+    }
 }
 
 /// Coefficient of two colliders by the stronger of their rules (`CombineRule`).

@@ -10,10 +10,12 @@ pub struct Solved {
     pub impulses: [(f32, [f32; 2]); 4],
     /// Sums over the sub-steps.
     pub totals: [[f32; 3]; 4],
-    /// What a point bears in the long run.
+    /// What the points bear in the long run, on the mean.
     pub remembered: f32,
     /// Angular impulse against twisting and rolling.
     pub resisted: [f32; 3],
+    /// What each point bears more.
+    pub deviations: [f32; 4],
 }
 
 /// What the slot remembers of one point.
@@ -28,10 +30,11 @@ pub fn store(manifold: &Manifold, point: usize, solved: &Solved) -> Impulse {
 
 /// What the slot remembers of the manifold as a whole.
 pub fn store_memory(manifold: &Manifold, solved: &Solved) -> ManifoldMemory {
-    let used = |point: usize| if point < manifold.count as usize { solved.totals[point] } else { [0.0; 3] };
+    let used = |point: usize| point < manifold.count as usize;
     ManifoldMemory {
         remembered: solved.remembered * manifold.count as f32,
         resisted: solved.resisted,
-        totals: std::array::from_fn(used),
+        deviations: std::array::from_fn(|point| if used(point) { solved.deviations[point] } else { 0.0 }),
+        totals: std::array::from_fn(|point| if used(point) { solved.totals[point] } else { [0.0; 3] }),
     }
 }

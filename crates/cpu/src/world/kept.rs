@@ -5,7 +5,7 @@ use crate::broadphase::{self, Boxes, Finder, Search, TooMany};
 use crate::contact::{self, Matched};
 use crate::shared::Shared;
 use crate::solver::{self, Rows, prepare, store};
-use crate::{bounds, edit, motion, narrowphase};
+use crate::{bounds, continuous, edit, motion, narrowphase};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 use tumble_core::edit::EditBatch;
@@ -215,10 +215,16 @@ impl Kept {
         let run = watch.next(run, "motion");
         contact::commit_free(&mut self.free, &matched);
         self.commit_slots(&states, &matched, &manifolds, &batches);
+        let mut shares = vec![1.0f32; states.len()];
+        let short = matched.pairs.par_iter().with_min_len(512);
+        let short = short.filter_map(|pair| continuous::share(pair, &self.colliders, &states, &bodies));
+        for (body, share) in short.collect::<Vec<_>>() {
+            shares[body as usize] = shares[body as usize].min(share);
+        }
         self.poses.resize(states.len(), PoseRecord::zeroed());
         let ends = bodies.par_iter().zip(&self.props).zip(states.par_iter_mut().zip(&mut self.poses));
         let bad = ends.enumerate().with_min_len(256).filter_map(|(slot, ((body, props), (state, pose)))| {
-            let (new, bad) = motion::commit(body, state);
+            let (new, bad) = motion::commit(body, state, shares[slot]);
             (*state, *pose) = (new, PoseRecord::of(&new, props));
             bad.then_some(slot)
         });
