@@ -224,12 +224,12 @@ fn constraints(
     head.round_a = round_a;
     head.round_b = round_b;
     head.between = between;
-    let radius = lever(pair.a, pair.b);
-    head.rolling_resistance =
-        radius * max(colliders[pair.a].rolling_resistance, colliders[pair.b].rolling_resistance);
-    head.twisting_resistance =
-        radius * max(colliders[pair.a].twisting_resistance, colliders[pair.b].twisting_resistance);
+    head.rolling_resistance = max(colliders[pair.a].rolling_resistance, colliders[pair.b].rolling_resistance);
+    head.twisting_resistance = max(colliders[pair.a].twisting_resistance, colliders[pair.b].twisting_resistance);
     if resists(head) {
+        let radius = lever(pair.a, pair.b);
+        head.rolling_resistance *= radius;
+        head.twisting_resistance *= radius;
         let k11 = turning(a, b, t[0], t[0]);
         let k12 = turning(a, b, t[0], t[1]);
         let k22 = turning(a, b, t[1], t[1]);

@@ -131,10 +131,12 @@ pub(super) fn prepare_head(
         between: manifold.between,
         ..ConstraintHead::zeroed()
     };
-    let lever = lever(ca, cb);
-    head.rolling_resistance = ca.rolling_resistance.max(cb.rolling_resistance) * lever;
-    head.twisting_resistance = ca.twisting_resistance.max(cb.twisting_resistance) * lever;
+    head.rolling_resistance = ca.rolling_resistance.max(cb.rolling_resistance);
+    head.twisting_resistance = ca.twisting_resistance.max(cb.twisting_resistance);
     if resists(&head) {
+        let lever = lever(ca, cb);
+        head.rolling_resistance *= lever;
+        head.twisting_resistance *= lever;
         let (a, b) = (&bodies[ca.body as usize], &bodies[cb.body as usize]);
         let normal = vec3(manifold.normal);
         let (t1, t2) = tangents(normal);
