@@ -120,7 +120,9 @@ fn bounds_of(collider: Collider) -> Aabb {
     }
     let dynamic = moves(state.flags);
     let fixed = (state.flags & BODY_KIND) == BODY_FIXED;
-    let body = collider.body | AABB_LIVE | select(0u, AABB_DYNAMIC, dynamic) | select(0u, AABB_FIXED, fixed);
+    let asleep = (state.flags & BODY_ASLEEP) != 0u;
+    let body = collider.body | AABB_LIVE | select(0u, AABB_DYNAMIC, dynamic) | select(0u, AABB_FIXED, fixed)
+        | select(0u, AABB_ASLEEP, asleep);
     let offset = rotate(state.rotation, collider.position);
     let middle = state.position + offset;
     let orientation = multiply(state.rotation, collider.rotation);

@@ -211,6 +211,9 @@ fn commit_pairs(
         return;
     }
     pairs[i] = next_pairs[i];
+    if (next_pairs[i].kind & PAIR_ASLEEP) != 0u {
+        return;
+    }
     commit_pair(manifolds[i].count, pair_batch[i], next_pairs[i].slot);
 }
 
@@ -236,7 +239,7 @@ fn commit_found(
     if i >= control.pair_count || control.stop != 0u {
         return;
     }
-    if manifolds[i].recycled == 0u {
+    if manifolds[i].recycled == 0u && (next_pairs[i].kind & PAIR_ASLEEP) == 0u {
         let pair = next_pairs[i];
         let rotation_a = work_states[colliders[pair.a].body].rotation;
         let rotation_b = work_states[colliders[pair.b].body].rotation;

@@ -15,7 +15,7 @@
 //#import shared/step.wgsl
 //#import shared/thread.wgsl
 
-const CONTROL_WORDS: u32 = 112u;
+const CONTROL_WORDS: u32 = 120u;
 const CLASSES: u32 = 1024u;
 const NO_CLAIM: u32 = 0xffffffffu;
 const LONGEST_RANGE: u32 = 50000u; // turns of one loop
@@ -153,6 +153,7 @@ fn apply_to_body(record: EditRecord, state: ptr<function, BodyState>, own_props:
         case EDIT_FORCE_AT: {
             pull(state, *own_props, a, cross(b - (*state).position, a));
         }
+        case EDIT_WAKE: {}
         default: {
             (*state).flags |= BODY_FROZEN;
             (*state).linear_velocity = vec3<f32>();
@@ -197,6 +198,7 @@ fn read_props(record: EditRecord) -> BodyProps {
     read.linear_damping = bitcast<f32>(record.data[2].w);
     read.frame = xyzw(record.data[3]);
     read.angular_damping = bitcast<f32>(record.data[4].x);
+    read.reach = bitcast<f32>(record.data[4].y);
     return read;
 }
 

@@ -18,6 +18,8 @@
 
 // Largest turn of a body in a sub-step, rad; it bounds the number of pieces of a turn.
 const MAX_TURN: f32 = 32.0;
+// Flags of a body that stands still, whatever its kind.
+const STILL: u32 = BODY_FROZEN | BODY_ASLEEP;
 // Beyond this a velocity (m/s, rad/s) or position (m) is taken for what it is: an explosion.
 const STATE_LIMIT: f32 = 1e9;
 // Share of a body's eigenvalue that comes from its neighbours.
@@ -148,7 +150,7 @@ fn turn(i: u32, h: f32) {
 // a constant force). One that is touched moves by the velocity that its contacts were solved for.
 fn integrate_position(i: u32) {
     let kind = work_states[i].flags & BODY_KIND;
-    if kind == BODY_NONE || kind == BODY_FIXED || (work_states[i].flags & BODY_FROZEN) != 0u {
+    if kind == BODY_NONE || kind == BODY_FIXED || (work_states[i].flags & STILL) != 0u {
         return;
     }
     var way = solver_bodies[i].linear_velocity * step.h;
@@ -262,7 +264,7 @@ fn commit(
     var state = work_states[i];
     state.force = vec3<f32>();
     state.torque = vec3<f32>();
-    if (state.flags & BODY_KIND) != BODY_NONE && (state.flags & BODY_FROZEN) == 0u {
+    if (state.flags & BODY_KIND) != BODY_NONE && (state.flags & STILL) == 0u {
         let body = solver_bodies[i];
         // Its way, or as much of it as leads into nothing that stands still (`continuous`).
         let position = state.position + body.translation * bitcast<f32>(shares[i]);

@@ -35,8 +35,8 @@ pub use tumble_core as core;
 pub use tumble_core::{
     Batching, BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Contact, ContactPoint,
     Contacts, Editor, Error, Inserted, MortonBits, Nearest, NearestQuery, OnePass, Overlap, OverlapShape, Overlaps,
-    Params, Pose, Poses, Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, Soft, Solver, StepReport,
-    Traversal, Velocities, Velocity,
+    Params, Pose, Poses, Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, Sleep, Soft, Solver,
+    StepReport, Traversal, Velocities, Velocity,
 };
 pub use world::{Backend, World};
 
@@ -45,7 +45,8 @@ pub mod prelude {
     pub use crate::{
         Backend, Batching, BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Contact,
         ContactPoint, Contacts, Error, Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Params, Pose, Poses,
-        Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, StepReport, Velocities, Velocity, World,
+        Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, Sleep, StepReport, Velocities, Velocity,
+        World,
     };
     pub use glam::{Quat, Vec3};
 }

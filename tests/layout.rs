@@ -72,8 +72,9 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         }
         BodyProps {
             inverse_inertia, inverse_mass, inertia, gravity_scale, center_of_mass, linear_damping, frame,
-            angular_damping, pad_a, pad_b, pad_c
+            angular_damping, reach, pad_b, pad_c
         }
+        Rest { position, time, rotation, island, pad_a, pad_b, pad_c }
         SolverBody {
             linear_velocity, inverse_mass, angular_velocity, touched, translation, eigenvalue, delta,
             inverse_inertia_diagonal, pad_b, inverse_inertia_off, pad_c, linear_start, weight, angular_start, weighted
@@ -100,7 +101,8 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             stop, overflow, needed, step, old_pair_count, free_count, colored_as, frozen_count, pair_count, processed,
             new_count, dead_count, constraint_count, point_count, batch_count, rounds, unplaced, last_count,
             large_count, max_degree, solved, turns, cell_class, cell_bits, center_min, inverse_cell, center_max,
-            pad_a, batch_start, quarantined, pad_b
+            pad_a, batch_start, quarantined, pad_b, islands, islands_open, asleep, islands_asleep,
+            awake, manifolds_asleep, pad_c
         }
         EditRecord { op, target, kind, generation, data }
         EditRange { first, count }
@@ -117,7 +119,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             speculative_distance, restitution_threshold, body_count, collider_count, pair_capacity, cell_table_bits,
             large_limit, edit_ranges, drop_pair, write_poses, batch_rounds, last_limit, wide_batches,
             static_bias_rate, static_mass_scale, static_impulse_scale, memory_gain, memory_limit,
-            memory_band, blow_speed, solver, batching, pad_a, pad_b
+            memory_band, blow_speed, solver, batching, sleep_distance, sleep_time, wake_all, pad_a, pad_b, pad_c
         }
     })
 }
@@ -135,17 +137,17 @@ macro_rules! constants {
 
 fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
     constants! {
-        body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN }
+        body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN, ASLEEP, STAYS_AWAKE }
         solver as "SOLVER_" { ONE_PASS, SOFT }
         shape_kind as "SHAPE_" { NONE, BALL, CUBOID, HALFSPACE }
-        aabb_body as "AABB_" { INDEX, FIXED, DYNAMIC, LIVE }
+        aabb_body as "AABB_" { INDEX, FIXED, DYNAMIC, LIVE, ASLEEP }
         pair_kind as "PAIR_" {
-            NONE, BALL_BALL, BALL_CUBOID, CUBOID_CUBOID, BALL_HALFSPACE, CUBOID_HALFSPACE, COUNT, MASK, FRESH
+            NONE, BALL_BALL, BALL_CUBOID, CUBOID_CUBOID, BALL_HALFSPACE, CUBOID_HALFSPACE, COUNT, MASK, FRESH, ASLEEP
         }
         overflow as "OVERFLOW_" { NONE, PAIRS, TURNS, LAST_BATCH, UNBOUNDED, SWEEP }
         edit_op as "EDIT_" {
-            SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, COLLIDER,
-            COLLIDER_REMOVE
+            SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, WAKE,
+            COLLIDER, COLLIDER_REMOVE
         }
         query_word as "QUERY_" { UNBOUNDED, TURNS, TOTAL, COUNT }
         tree_members as "MEMBERS_" { MOVING, FIXED, LARGE, ALL }

@@ -10,7 +10,9 @@ use std::process::Command;
 
 use tumble::{Backend, World};
 use tumble_core::glam::{Quat, Vec3};
-use tumble_core::{Capacities, ColliderBuilder, Error, Params, Pose, Result, RigidBodyBuilder, Scene, scenes};
+use tumble_core::{
+    Capacities, ColliderBuilder, Error, OnePass, Params, Pose, Result, RigidBodyBuilder, Scene, Soft, Solver, scenes,
+};
 use tumble_gpu::Gpu;
 use worlds::{SIDES, hash, report, steps};
 
@@ -32,6 +34,8 @@ fn field_of<T>(result: Result<T>) -> &'static str {
 fn bad_params() -> Vec<(Params, &'static str)> {
     let good = Params::default();
     let room = good.capacities;
+    let one = |law| Params { solver: Solver::OnePass(law), ..good };
+    let soft = |law| Params { solver: Solver::Soft(law), ..good };
     let mut cases = vec![
         (Params { substeps: 0, ..good }, "substeps"),
         (Params { threads: Some(0), ..good }, "threads"),
@@ -41,16 +45,20 @@ fn bad_params() -> Vec<(Params, &'static str)> {
         (Params { capacities: Capacities { colliders: Some(0), ..room }, ..good }, "capacities.colliders"),
         (Params { capacities: Capacities { edits: Some(u32::MAX), ..room }, ..good }, "capacities.edits"),
         (Params { dt: 0.0, ..good }, "dt"),
-        (Params { contact_frequency: 0.0, ..good }, "contact_frequency"),
-        (Params { static_contact_frequency: 0.0, ..good }, "static_contact_frequency"),
-        (Params { contact_damping_ratio: 0.0, ..good }, "contact_damping_ratio"),
+        (one(OnePass { stiffness: 1.0, ..OnePass::default() }), "solver.stiffness"),
+        (one(OnePass { leak: 0.0, ..OnePass::default() }), "solver.leak"),
+        (soft(Soft { frequency: 0.0, ..Soft::default() }), "solver.frequency"),
+        (soft(Soft { static_frequency: 0.0, ..Soft::default() }), "solver.static_frequency"),
+        (soft(Soft { damping_ratio: 0.0, ..Soft::default() }), "solver.damping_ratio"),
     ];
     for bad in [-1.0, NAN, INF, -INF] {
         cases.extend([
             (Params { dt: bad, ..good }, "dt"),
-            (Params { contact_frequency: bad, ..good }, "contact_frequency"),
-            (Params { static_contact_frequency: bad, ..good }, "static_contact_frequency"),
-            (Params { contact_damping_ratio: bad, ..good }, "contact_damping_ratio"),
+            (one(OnePass { stiffness: bad, ..OnePass::default() }), "solver.stiffness"),
+            (one(OnePass { leak: bad, ..OnePass::default() }), "solver.leak"),
+            (soft(Soft { frequency: bad, ..Soft::default() }), "solver.frequency"),
+            (soft(Soft { static_frequency: bad, ..Soft::default() }), "solver.static_frequency"),
+            (soft(Soft { damping_ratio: bad, ..Soft::default() }), "solver.damping_ratio"),
             (Params { max_push_speed: bad, ..good }, "max_push_speed"),
             (Params { speculative_distance: bad, ..good }, "speculative_distance"),
             (Params { restitution_threshold: bad, ..good }, "restitution_threshold"),

@@ -13,10 +13,10 @@ fn meets(a: Aabb, b: Aabb) -> bool {
     return !(any(a.min > b.max) || any(b.min > a.max)) && matter(a.body, b.body);
 }
 
-// Whether a contact between colliders of these bodies could push anything.
+// Whether a contact between colliders of these bodies could push anything, or could if it were awake.
 fn matter(a: u32, b: u32) -> bool {
     let both = (a & b & AABB_LIVE) != 0u;
-    let one_moves = ((a | b) & AABB_DYNAMIC) != 0u;
+    let one_moves = ((a | b) & (AABB_DYNAMIC | AABB_ASLEEP)) != 0u;
     return both && one_moves && ((a ^ b) & AABB_INDEX) != 0u;
 }
 

@@ -7,6 +7,8 @@ const BODY_KINEMATIC: u32 = 2u;
 const BODY_DYNAMIC: u32 = 3u;
 const BODY_KIND: u32 = 3u;
 const BODY_FROZEN: u32 = 4u;
+const BODY_ASLEEP: u32 = 8u;
+const BODY_STAYS_AWAKE: u32 = 16u;
 
 struct BodyState {
     position: vec3<f32>,
@@ -31,6 +33,16 @@ struct BodyProps {
     linear_damping: f32,
     frame: vec4<f32>,
     angular_damping: f32,
+    reach: f32,
+    pad_b: u32,
+    pad_c: u32,
+}
+
+struct Rest {
+    position: vec3<f32>,
+    time: f32,
+    rotation: vec4<f32>,
+    island: u32,
     pad_a: u32,
     pad_b: u32,
     pad_c: u32,
@@ -62,5 +74,5 @@ struct PoseRecord {
 
 // Whether contacts can push the body.
 fn moves(flags: u32) -> bool {
-    return (flags & (BODY_KIND | BODY_FROZEN)) == BODY_DYNAMIC;
+    return (flags & (BODY_KIND | BODY_FROZEN | BODY_ASLEEP)) == BODY_DYNAMIC;
 }

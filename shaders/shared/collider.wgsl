@@ -6,7 +6,8 @@ const SHAPE_BALL: u32 = 1u;
 const SHAPE_CUBOID: u32 = 2u;
 const SHAPE_HALFSPACE: u32 = 3u;
 
-const AABB_INDEX: u32 = 0x1fffffffu;
+const AABB_INDEX: u32 = 0x0fffffffu;
+const AABB_ASLEEP: u32 = 0x10000000u;
 const AABB_FIXED: u32 = 0x20000000u;
 const AABB_DYNAMIC: u32 = 0x80000000u;
 const AABB_LIVE: u32 = 0x40000000u;

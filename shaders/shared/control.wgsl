@@ -46,6 +46,12 @@ const CONTROL_INVERSE_CELL: u32 = 27u;
 const CONTROL_CENTER_MAX: u32 = 28u;
 const CONTROL_BATCH_START: u32 = 32u;
 const CONTROL_QUARANTINED: u32 = 100u;
+const CONTROL_ISLANDS: u32 = 112u;
+const CONTROL_ISLANDS_OPEN: u32 = 113u;
+const CONTROL_ASLEEP: u32 = 114u;
+const CONTROL_ISLANDS_ASLEEP: u32 = 115u;
+const CONTROL_AWAKE: u32 = 116u;
+const CONTROL_MANIFOLDS_ASLEEP: u32 = 117u;
 
 struct Control {
     stop: u32,
@@ -79,4 +85,11 @@ struct Control {
     batch_start: array<vec4<u32>, 17>,
     quarantined: array<vec4<u32>, 2>,
     pad_b: vec4<u32>,
+    islands: u32,
+    islands_open: u32,
+    asleep: u32,
+    islands_asleep: u32,
+    awake: u32,
+    manifolds_asleep: u32,
+    pad_c: vec2<u32>,
 }

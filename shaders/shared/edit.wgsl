@@ -11,8 +11,9 @@ const EDIT_IMPULSE_AT: u32 = 7u;
 const EDIT_FORCE: u32 = 8u;
 const EDIT_FORCE_AT: u32 = 9u;
 const EDIT_FREEZE: u32 = 10u;
-const EDIT_COLLIDER: u32 = 11u;
-const EDIT_COLLIDER_REMOVE: u32 = 12u;
+const EDIT_WAKE: u32 = 11u;
+const EDIT_COLLIDER: u32 = 12u;
+const EDIT_COLLIDER_REMOVE: u32 = 13u;
 
 struct EditRecord {
     op: u32,

@@ -11,6 +11,7 @@ const PAIR_CUBOID_HALFSPACE: u32 = 5u;
 const PAIR_COUNT: u32 = 6u;
 const PAIR_MASK: u32 = 255u;
 const PAIR_FRESH: u32 = 256u;
+const PAIR_ASLEEP: u32 = 512u;
 
 struct Pair {
     a: u32,

@@ -43,6 +43,10 @@ struct StepParams {
     blow_speed: f32,
     solver: u32,
     batching: u32,
+    sleep_distance: f32,
+    sleep_time: f32,
+    wake_all: u32,
     pad_a: u32,
     pad_b: u32,
+    pad_c: u32,
 }

@@ -34,6 +34,8 @@ pub struct RigidBodyBuilder {
     pub linear_damping: f32,
     /// 1/s.
     pub angular_damping: f32,
+    /// Whether it may be put to sleep with its island, where the world has [`Params::sleep`](crate::Params::sleep).
+    pub can_sleep: bool,
 }
 
 const FINITE: &str = "finite numbers";
@@ -75,6 +77,7 @@ impl RigidBodyBuilder {
             gravity_scale: 1.0,
             linear_damping: 0.0,
             angular_damping: 0.0,
+            can_sleep: true,
         }
     }
     /// A body that never moves.
@@ -122,6 +125,11 @@ impl RigidBodyBuilder {
     /// Share of the angular velocity lost, 1/s; 0 at first.
     pub fn angular_damping(mut self, damping: f32) -> Self {
         self.angular_damping = damping;
+        self
+    }
+    /// Whether it may be put to sleep; true at first. One that may not keeps all awake that it touches.
+    pub fn can_sleep(mut self, can_sleep: bool) -> Self {
+        self.can_sleep = can_sleep;
         self
     }
 

@@ -165,7 +165,7 @@ impl Editor {
         self.scene.remove(body)?;
         self.push(edit_op::REMOVE, body, [0.0; 4], [0.0; 4]);
         for slot in colliders {
-            self.push_collider(edit_op::COLLIDER_REMOVE, slot, &Collider::zeroed());
+            self.push_collider(edit_op::COLLIDER_REMOVE, slot, &Collider { body: body.slot, ..Collider::zeroed() });
         }
         Ok(())
     }
@@ -228,6 +228,14 @@ impl Editor {
             "finite numbers up to 1e6 m/s²",
         )?;
         self.scene.gravity = gravity;
+        Ok(())
+    }
+
+    /// Wakes a body and all that sleep with it. Every other edit of a body does so too, and that of gravity wakes all; one
+    /// that sleeps again does so after the usual time.
+    pub fn wake(&mut self, body: BodyHandle) -> Result<()> {
+        self.scene.entry(body)?;
+        self.push(edit_op::WAKE, body, [0.0; 4], [0.0; 4]);
         Ok(())
     }
 

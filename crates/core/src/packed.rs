@@ -3,7 +3,7 @@
 use crate::builder::RigidBodyType;
 use crate::error::Result;
 use crate::handle::BodyHandle;
-use crate::layout::{BodyProps, BodyState, Collider, body_flags};
+use crate::layout::{BodyProps, BodyState, Collider, body_flags, shape_kind};
 use crate::mass::MassProperties;
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -74,7 +74,7 @@ pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<PackedBody> {
     let rotation = builder.rotation.normalize();
     let state = BodyState {
         position: (builder.translation + rotation * mass.center_of_mass).to_array(),
-        flags: body_kind(builder.body_type),
+        flags: body_kind(builder.body_type) | if dynamic && !builder.can_sleep { body_flags::STAYS_AWAKE } else { 0 },
         rotation: (rotation * mass.principal_frame).normalize().to_array(),
         linear_velocity: if builder.body_type == RigidBodyType::Fixed { [0.0; 3] } else { builder.linvel.to_array() },
         generation: body.generation(),
@@ -82,19 +82,8 @@ pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<PackedBody> {
         ..BodyState::zeroed()
     };
     let inverse = |x: f32| if x > 0.0 { 1.0 / x } else { 0.0 };
-    let props = BodyProps {
-        inverse_inertia: mass.principal_inertia.to_array().map(inverse),
-        inverse_mass: inverse(mass.mass),
-        inertia: mass.principal_inertia.to_array(),
-        gravity_scale: builder.gravity_scale,
-        center_of_mass: mass.center_of_mass.to_array(),
-        linear_damping: builder.linear_damping,
-        frame: mass.principal_frame.to_array(),
-        angular_damping: builder.angular_damping,
-        ..BodyProps::zeroed()
-    };
     let to_principal = mass.principal_frame.inverse();
-    let colliders = scene
+    let colliders: Vec<_> = scene
         .colliders_of(body)?
         .into_iter()
         .map(|(handle, c)| {
@@ -121,7 +110,31 @@ pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<PackedBody> {
             (handle.slot(), collider)
         })
         .collect();
+    let reach = colliders.iter().map(|(_, collider)| reach(collider)).fold(0.0, f32::max);
+    let props = BodyProps {
+        inverse_inertia: mass.principal_inertia.to_array().map(inverse),
+        inverse_mass: inverse(mass.mass),
+        inertia: mass.principal_inertia.to_array(),
+        gravity_scale: builder.gravity_scale,
+        center_of_mass: mass.center_of_mass.to_array(),
+        linear_damping: builder.linear_damping,
+        frame: mass.principal_frame.to_array(),
+        angular_damping: builder.angular_damping,
+        reach,
+        ..BodyProps::zeroed()
+    };
     Ok(PackedBody { state, props, colliders })
+}
+
+/// How far the collider's surface is from the body's centre of mass at most, m.
+fn reach(collider: &Collider) -> f32 {
+    let size = Vec3::from_array(collider.size);
+    let own = match collider.shape {
+        shape_kind::BALL => size.x,
+        shape_kind::CUBOID => size.length(),
+        _ => 0.0, // without end: on bodies that never turn
+    };
+    Vec3::from_array(collider.position).length() + own
 }
 
 fn body_kind(body_type: RigidBodyType) -> u32 {

@@ -118,6 +118,41 @@ impl Default for Capacities {
     }
 }
 
+/// When bodies are put to sleep. A sleeping body keeps its pose, its contacts and what they push, and costs next to
+/// nothing.
+///
+/// An island, the bodies that hang together by contacts, sleeps as a whole once no point of any body's surface has been
+/// farther than `distance` from where it was, for `time`. Poses decide and not velocities, since piles keep bodies that
+/// rattle in their places for ever; so what creeps along more slowly than `distance / time` is taken to rest. Nothing
+/// sleeps that a moving kinematic body touches.
+///
+/// An island wakes as a whole, within the step, when something that moves touches it, when one of its bodies or what it
+/// rests on is edited or removed, and when gravity changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sleep {
+    /// How far a point of the surface may stray while its body is at rest, m.
+    pub distance: f32,
+    /// How long all bodies of an island must have been at rest, s. Less than some tenths may catch one at the top of its
+    /// flight.
+    pub time: f32,
+}
+
+impl Default for Sleep {
+    /// 2 mm in 2 s.
+    fn default() -> Self {
+        Self { distance: 2e-3, time: 2.0 }
+    }
+}
+
+impl Sleep {
+    fn validate(&self) -> Result<()> {
+        let what = || "Params".to_string();
+        let Self { distance, time } = *self;
+        check((1e-6..=1e3).contains(&distance), what, "sleep.distance", distance, "1e-6 to 1000 m")?;
+        check((1e-3..=1e6).contains(&time), what, "sleep.time", time, "0.001 to 1e6 s")
+    }
+}
+
 /// Parameters of a world. Change them between steps with `set_params`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Params {
@@ -135,6 +170,9 @@ pub struct Params {
     pub speculative_distance: f32,
     /// Slowest approach that bounces, m/s. 0.5 at first.
     pub restitution_threshold: f32,
+    /// When bodies at rest are put to sleep. `None` at first: nothing sleeps, and nothing is spent on it. Without it, all
+    /// that sleep wake.
+    pub sleep: Option<Sleep>,
     /// Which broad phase. All find the same pairs, so that results do not depend on it.
     pub broadphase: Broadphase,
     /// How trees are walked.
@@ -163,6 +201,7 @@ impl Default for Params {
             max_push_speed: 0.5,
             speculative_distance: 0.02,
             restitution_threshold: 0.5,
+            sleep: None,
             broadphase: Broadphase::Auto,
             traversal: Traversal::default(),
             morton_bits: MortonBits::default(),
@@ -197,6 +236,7 @@ impl Params {
             self.restitution_threshold,
             "0 to 1e6 m/s",
         )?;
+        self.sleep.map_or(Ok(()), |sleep| sleep.validate())?;
         if let Some(threads) = self.threads {
             check((1..=1024).contains(&threads), what, "threads", threads, "1 to 1024")?;
         }
@@ -245,6 +285,8 @@ impl Params {
             batch_rounds: batch_rounds(self.batching_word()),
             last_limit: LAST_LIMIT,
             write_poses: 1,
+            sleep_distance: self.sleep.map_or(-1.0, |sleep| sleep.distance),
+            sleep_time: self.sleep.map_or(f32::MAX, |sleep| sleep.time),
             batching: self.batching_word(),
             ..bytemuck::Zeroable::zeroed()
         }

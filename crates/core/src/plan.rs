@@ -17,6 +17,8 @@ pub struct Plan {
     /// Room for balls and cuboids on fixed bodies, which have a tree of their own: their number, rounded up to a power of
     /// two, so that it seldom widens.
     pub fixed: u32,
+    /// Something asks which bodies hang together by contacts: sleep does.
+    pub islands: bool,
 }
 
 impl Plan {
@@ -43,7 +45,7 @@ impl Plan {
         allow(balls > 0 && halfspaces > 0, pair_kind::BALL_HALFSPACE);
         allow(cuboids > 0 && halfspaces > 0, pair_kind::CUBOID_HALFSPACE);
         let fixed = if fixed > 0 { fixed.next_power_of_two() } else { 0 };
-        Self { pair_kinds, restitution, fixed }
+        Self { pair_kinds, restitution, fixed, islands: false }
     }
 
     /// Adds what `other` needs; true when that was anything new.
@@ -52,6 +54,7 @@ impl Plan {
         self.pair_kinds |= other.pair_kinds;
         self.restitution |= other.restitution;
         self.fixed = self.fixed.max(other.fixed);
+        self.islands |= other.islands;
         *self != before
     }
 
@@ -68,10 +71,11 @@ impl fmt::Display for Plan {
         let kinds: Vec<_> = (1..pair_kind::COUNT).filter(|&k| self.has(k)).map(|k| NAMES[k as usize]).collect();
         write!(
             f,
-            "pairs: {}; restitution: {}; fixed: {}",
+            "pairs: {}; restitution: {}; fixed: {}; islands: {}",
             if kinds.is_empty() { "none".into() } else { kinds.join(", ") },
             self.restitution,
-            self.fixed
+            self.fixed,
+            self.islands
         )
     }
 }

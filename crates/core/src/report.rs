@@ -72,6 +72,12 @@ pub struct StepReport {
     pub last_batch: u32,
     /// Found minus processed, over pairs and constraints: zero, or something was lost.
     pub lost: u64,
+    /// Bodies asleep when the step was done. Their pairs, manifolds and contacts are counted above.
+    pub asleep: u32,
+    /// Islands awake, where the world has [`Params::sleep`](crate::Params::sleep); else 0.
+    pub islands: u32,
+    /// Islands asleep.
+    pub islands_asleep: u32,
     /// Bodies in quarantine, all told.
     pub quarantined: u32,
     /// Slots of bodies newly quarantined in this step, the first few.
@@ -106,13 +112,16 @@ impl StepReport {
         Self {
             step: control.step as u64,
             pairs: control.pair_count,
-            manifolds: control.constraint_count,
+            manifolds: control.constraint_count + control.manifolds_asleep,
             contacts: control.point_count,
             batches: control.batch_count,
             batch_rounds: control.rounds,
             last_batch: control.last_count,
             broadphase_turns: control.turns,
             lost,
+            asleep: control.asleep,
+            islands: control.islands,
+            islands_asleep: control.islands_asleep,
             quarantined: control.frozen_count,
             newly_quarantined: control.quarantined[..QUARANTINE_NAMES]
                 .iter()
@@ -155,6 +164,9 @@ impl fmt::Display for StepReport {
         }
         if self.quarantined > 0 {
             write!(f, "; {} in quarantine (new: {:?})", self.quarantined, self.newly_quarantined)?;
+        }
+        if self.islands_asleep > 0 {
+            write!(f, "; asleep: {} bodies in {} islands", self.asleep, self.islands_asleep)?;
         }
         for (buffer, n) in &self.growths {
             write!(f, "; `{buffer}` grew {n} times")?;

@@ -7,7 +7,7 @@ use crate::mass::MassProperties;
 use crate::shape::Shape;
 use glam::Vec3;
 
-/// Most bodies or colliders in one scene: an index must fit beside two flags.
+/// Most bodies or colliders in one scene: an index must fit beside four flags.
 pub(crate) const MAX_COUNT: usize = 1 << 26;
 
 #[derive(Debug, Clone)]

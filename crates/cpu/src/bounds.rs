@@ -15,6 +15,9 @@ pub const STATE_LIMIT: f32 = 1e9;
 /// Stands for infinity in the box of a half-space.
 pub const FAR: f32 = 1e30;
 
+/// The box of what takes no part.
+pub const NOWHERE: Aabb = Aabb { min: [FAR; 3], body: 0, max: [-FAR; 3], class: 0 };
+
 /// Puts a body whose state is not finite (or past [`STATE_LIMIT`]) in quarantine: it stands still at `last`, the
 /// pose that it had when the last step committed. True when that happened now.
 pub fn quarantine(state: &mut BodyState, last: &BodyState) -> bool {
@@ -49,20 +52,21 @@ pub fn quarantine(state: &mut BodyState, last: &BodyState) -> bool {
 
 /// Whether contacts can push the body.
 pub fn moves(flags: u32) -> bool {
-    flags & (body_flags::KIND | body_flags::FROZEN) == body_flags::DYNAMIC
+    flags & (body_flags::KIND | body_flags::FROZEN | body_flags::ASLEEP) == body_flags::DYNAMIC
 }
 
 /// The box of one collider over the step.
 pub fn collider_bounds(collider: &Collider, state: &BodyState, props: &BodyProps, step: &StepParams) -> Aabb {
     let live = collider.shape != shape_kind::NONE && state.flags & body_flags::KIND != body_flags::NONE;
     if !live {
-        return Aabb { min: [FAR; 3], body: 0, max: [-FAR; 3], class: 0 };
+        return NOWHERE;
     }
     let dynamic = moves(state.flags);
     let fixed = state.flags & body_flags::KIND == body_flags::FIXED;
     let body = collider.body
         | aabb_body::LIVE
         | if dynamic { aabb_body::DYNAMIC } else { 0 }
+        | if state.flags & body_flags::ASLEEP != 0 { aabb_body::ASLEEP } else { 0 }
         | if fixed { aabb_body::FIXED } else { 0 };
     let rotation = quat(state.rotation);
     let offset = rotate(rotation, vec3(collider.position));

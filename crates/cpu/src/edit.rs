@@ -77,6 +77,7 @@ fn apply_to_body(record: &EditRecord, state: &mut BodyState, props: &mut BodyPro
         edit_op::IMPULSE_AT => push(state, props, a, (b - vec3(state.position)).cross(a)),
         edit_op::FORCE => pull(state, props, a, b),
         edit_op::FORCE_AT => pull(state, props, a, (b - vec3(state.position)).cross(a)),
+        edit_op::WAKE => {}
         _ => {
             state.flags |= body_flags::FROZEN;
             state.linear_velocity = [0.0; 3];

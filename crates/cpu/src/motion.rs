@@ -9,6 +9,9 @@ use tumble_core::layout::{BodyProps, BodyState, SolverBody, StepParams, body_fla
 /// Largest turn of a body in a sub-step, rad; it bounds the number of pieces of a turn.
 pub const MAX_TURN: f32 = 32.0;
 
+/// Flags of a body that stands still, whatever its kind.
+const STILL: u32 = body_flags::FROZEN | body_flags::ASLEEP;
+
 /// Acceleration by gravity and force, m/s².
 fn acceleration(state: &BodyState, props: &BodyProps, step: &StepParams) -> Vec3 {
     vec3(step.gravity) * props.gravity_scale + vec3(state.force) * props.inverse_mass
@@ -58,7 +61,7 @@ pub fn last_substep(body: &mut SolverBody, state: &BodyState, props: &BodyProps,
 /// for a constant force). One that is touched moves by the velocity that its contacts were solved for.
 pub fn integrate_position(body: &mut SolverBody, state: &BodyState, props: &BodyProps, step: &StepParams) {
     let kind = state.flags & body_flags::KIND;
-    if kind == body_flags::NONE || kind == body_flags::FIXED || state.flags & body_flags::FROZEN != 0 {
+    if kind == body_flags::NONE || kind == body_flags::FIXED || state.flags & STILL != 0 {
         return;
     }
     let mut way = vec3(body.linear_velocity) * step.h;
@@ -148,7 +151,7 @@ pub fn commit(body: &SolverBody, state: &BodyState, share: f32) -> (BodyState, b
     let mut new = *state;
     new.force = [0.0; 3];
     new.torque = [0.0; 3];
-    if state.flags & body_flags::KIND == body_flags::NONE || state.flags & body_flags::FROZEN != 0 {
+    if state.flags & body_flags::KIND == body_flags::NONE || state.flags & STILL != 0 {
         return (new, false);
     }
     let small = |v: [f32; 3]| finite(v) && vec3(v).abs().max_element() <= STATE_LIMIT;

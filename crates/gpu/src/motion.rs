@@ -23,7 +23,11 @@ impl Motion {
     pub(crate) fn record_commit(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
         recorder.stage("motion");
         recorder.dispatch_indirect(&self.shorten, &[], buffers.buffer("dispatch_args")?, args::PAIRS)?;
-        recorder.dispatch(&self.commit, &[], step.body_count.div_ceil(256))?;
+        recorder.dispatch(&self.commit, &[], step.body_count.div_ceil(256))
+    }
+
+    pub(crate) fn record_poses(&self, recorder: &mut Recorder, step: &StepParams) -> Result<()> {
+        recorder.stage("motion");
         recorder.dispatch(&self.write_poses, &[], step.body_count.div_ceil(256))
     }
 }

@@ -7,6 +7,7 @@ use crate::contact::Contact;
 use crate::edit::Edit;
 use crate::motion::Motion;
 use crate::narrowphase::Narrowphase;
+use crate::sleep::Sleep;
 use crate::solver::Solver;
 use crate::store::Sizes;
 use crate::{Buffers, Gpu, Pipelines, Recorder};
@@ -30,6 +31,8 @@ pub(crate) struct Stages {
     pub(crate) broadphase: Broadphase,
     contact: Contact,
     narrowphase: Narrowphase,
+    /// Where bodies may sleep.
+    sleep: Option<Sleep>,
     batch: Batch,
     solver: Solver,
     motion: Motion,
@@ -44,6 +47,7 @@ impl Stages {
             broadphase: Broadphase::new(gpu, pipelines, sizes, &built.choice)?,
             contact: Contact::new(gpu, pipelines, sizes)?,
             narrowphase: Narrowphase::new(gpu, pipelines, plan)?,
+            sleep: plan.islands.then(|| Sleep::new(gpu, pipelines, sizes)).transpose()?,
             batch: Batch::new(gpu, pipelines, sizes)?,
             solver: Solver::new(gpu, pipelines, plan, built.solver)?,
             motion: Motion::new(gpu, pipelines)?,
@@ -63,16 +67,32 @@ impl Stages {
     /// Records one step: the plan phase up to the second gate, then the commit phase, whose passes do nothing once the
     /// stop flag is up.
     pub(crate) fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
+        let may_sleep = step.sleep_distance >= 0.0;
         self.edit.record(recorder, step)?;
+        if let Some(sleep) = self.sleep.as_ref().filter(|_| may_sleep || step.wake_all != 0) {
+            sleep.record_edits(recorder, buffers, step)?;
+        }
         self.bounds.record(recorder, step)?;
         self.broadphase.record(recorder, buffers, step)?;
         self.contact.record_match(recorder, buffers)?;
         self.narrowphase.record(recorder, self.contact.a_pair())?;
+        if let Some(sleep) = self.sleep.as_ref().filter(|_| may_sleep) {
+            sleep.record_touch(recorder, step, self.contact.a_pair())?;
+        }
         self.batch.record(recorder, buffers, step, self.contact.a_pair())?;
 
         self.solver.record(recorder, buffers, step)?;
         self.contact.record_commit(recorder, buffers)?;
         self.motion.record_commit(recorder, buffers, step)?;
+        if let Some(sleep) = self.sleep.as_ref().filter(|_| may_sleep) {
+            sleep.record_settle(recorder, step)?;
+        }
+        self.motion.record_poses(recorder, step)?;
         self.contact.record_counts(recorder)
+    }
+
+    /// Records a step in which nothing is awake: but for its number, all is as it was.
+    pub(crate) fn record_idle(&self, recorder: &mut Recorder) -> Result<()> {
+        self.sleep.as_ref().map_or(Ok(()), |sleep| sleep.record_pass_time(recorder))
     }
 }

@@ -4,7 +4,7 @@ use crate::{Bind, Buffers, Gpu};
 use bytemuck::Zeroable;
 use tumble_core::layout::{
     Aabb, BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Control, EditRange, EditRecord,
-    FoundManifold, Impulse, Manifold, ManifoldMemory, Pair, PoseRecord, SolverBody, StepParams,
+    FoundManifold, Impulse, Manifold, ManifoldMemory, Pair, PoseRecord, Rest, SolverBody, StepParams,
 };
 use tumble_core::{PackedScene, Result};
 use wgpu::BufferUsages;
@@ -45,6 +45,8 @@ pub(crate) struct Sizes {
     pub(crate) bodies: u32,
     pub(crate) colliders: u32,
     pub(crate) pairs: u32,
+    /// Bodies if they may sleep, else 0.
+    pub(crate) sleepers: u32,
 }
 
 /// Which count an array follows.
@@ -53,10 +55,11 @@ enum Per {
     Body,
     Collider,
     Pair,
+    Sleeper,
 }
 
 /// Name, bytes of an element, what it follows, whether its content outlives a step.
-const ARRAYS: [(&str, usize, Per, bool); 31] = [
+const ARRAYS: [(&str, usize, Per, bool); 34] = [
     ("states", size_of::<BodyState>(), Per::Body, true),
     ("work_states", size_of::<BodyState>(), Per::Body, false),
     ("props", size_of::<BodyProps>(), Per::Body, true),
@@ -65,6 +68,9 @@ const ARRAYS: [(&str, usize, Per, bool); 31] = [
     ("shares", 4, Per::Body, false),
     ("masks", 8, Per::Body, false),
     ("claims", 4, Per::Body, false),
+    ("islands", 4, Per::Sleeper, false),
+    ("stirs", 4, Per::Sleeper, false),
+    ("rests", size_of::<Rest>(), Per::Sleeper, true),
     ("colliders", size_of::<Collider>(), Per::Collider, true),
     ("aabbs", size_of::<Aabb>(), Per::Collider, false),
     ("large_list", 4, Per::Collider, false),
@@ -100,6 +106,7 @@ fn count(per: Per, sizes: &Sizes) -> u64 {
         Per::Body => sizes.bodies,
         Per::Collider => sizes.colliders,
         Per::Pair => sizes.pairs,
+        Per::Sleeper => sizes.sleepers,
     })
 }
 

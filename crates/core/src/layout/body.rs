@@ -15,6 +15,10 @@ pub mod body_flags {
     pub const KIND: u32 = 3;
     /// Quarantined: its state stopped being finite; it stands still at its last finite pose, as if fixed.
     pub const FROZEN: u32 = 4;
+    /// Asleep, with its island: it stands still, and acts on nothing, until something wakes it.
+    pub const ASLEEP: u32 = 8;
+    /// Never to be put to sleep.
+    pub const STAYS_AWAKE: u32 = 16;
 }
 
 /// What lasts of a body from step to step. 96 bytes. Position is that of the centre of mass; the body frame
@@ -67,6 +71,27 @@ pub struct BodyProps {
     pub frame: [f32; 4],
     /// 1/s.
     pub angular_damping: f32,
+    /// No point of a collider's surface is farther from the centre of mass, m.
+    pub reach: f32,
+    /// Unused.
+    pub pad_b: u32,
+    /// Unused.
+    pub pad_c: u32,
+}
+
+/// Where a body came to rest, and for how long it has stayed there. 48 bytes. Lasts from step to step, where bodies may
+/// sleep.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Rest {
+    /// Centre of mass in the world when it came there, m.
+    pub position: [f32; 3],
+    /// How long no point of its surface has been farther from its place then than allowed, s.
+    pub time: f32,
+    /// Principal frame to world, when it came there.
+    pub rotation: [f32; 4],
+    /// Lowest slot of the bodies that sleep with it, while it sleeps.
+    pub island: u32,
     /// Unused.
     pub pad_a: u32,
     /// Unused.

@@ -15,7 +15,9 @@ pub mod shape_kind {
 /// Bits of [`Aabb::body`].
 pub mod aabb_body {
     /// Index of the body.
-    pub const INDEX: u32 = 0x1fff_ffff;
+    pub const INDEX: u32 = 0x0fff_ffff;
+    /// Set when the body sleeps: contacts push it no more until it wakes.
+    pub const ASLEEP: u32 = 0x1000_0000;
     /// Set when the body is fixed: it stays where it is until it is edited.
     pub const FIXED: u32 = 0x2000_0000;
     /// Set when a contact can push the body.

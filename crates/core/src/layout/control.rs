@@ -25,7 +25,7 @@ pub mod overflow {
     pub const SWEEP: u32 = 5;
 }
 
-/// Counters and decisions of a step, kept where the passes run. 448 bytes.
+/// Counters and decisions of a step, kept where the passes run. 480 bytes.
 ///
 /// Everything from `pair_count` on is written anew each step. `stop` is sticky: raised in the plan phase, cleared by
 /// the host when the buffer has grown.
@@ -100,4 +100,19 @@ pub struct Control {
     pub quarantined: [u32; QUARANTINE_NAMES],
     /// What passes of one step tell each other, see `contact.wgsl` and `broadphase/grid.wgsl`.
     pub pad_b: [u32; 4],
+
+    /// Islands of bodies that are awake, where they are looked for.
+    pub islands: u32,
+    /// 1 when a bound kept islands from being told apart.
+    pub islands_open: u32,
+    /// Bodies asleep.
+    pub asleep: u32,
+    /// Islands asleep.
+    pub islands_asleep: u32,
+    /// Bodies awake that contacts can push, and kinematic ones that move; where bodies may sleep.
+    pub awake: u32,
+    /// Manifolds with points of those asleep, which are no constraints of the step.
+    pub manifolds_asleep: u32,
+    /// Unused.
+    pub pad_c: [u32; 2],
 }

@@ -23,6 +23,8 @@ pub mod pair_kind {
     pub const MASK: u32 = 255;
     /// Set when the pair was not in the last step's list.
     pub const FRESH: u32 = 256;
+    /// Set when it is left out of the step since neither end is awake: what its slot remembers stays as it is.
+    pub const ASLEEP: u32 = 512;
 }
 
 /// Two colliders whose boxes overlap, `a < b`; lists of them are sorted by (a, b). 16 bytes.

@@ -8,7 +8,7 @@ pub mod solver {
     pub const SOFT: u32 = 1;
 }
 
-/// What one step is told, as a uniform. 144 bytes.
+/// What one step is told, as a uniform. 160 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct StepParams {
@@ -76,10 +76,18 @@ pub struct StepParams {
     pub solver: u32,
     /// How constraints are put into batches, see [`batching`].
     pub batching: u32,
+    /// How far a point of a body's surface may stray while the body is at rest, m; below 0 where nothing sleeps.
+    pub sleep_distance: f32,
+    /// How long all bodies of an island must have been at rest before it sleeps, s.
+    pub sleep_time: f32,
+    /// 1 when all who sleep wake.
+    pub wake_all: u32,
     /// Unused.
     pub pad_a: u32,
     /// Unused.
     pub pad_b: u32,
+    /// Unused.
+    pub pad_c: u32,
 }
 
 /// Words of [`StepParams::batching`]: a law, and flags.

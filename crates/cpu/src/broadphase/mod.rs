@@ -164,11 +164,11 @@ impl Query {
     }
 }
 
-/// Whether a contact between colliders of these bodies ([`aabb_body`]) could push anything.
+/// Whether a contact between colliders of these bodies ([`aabb_body`]) could push anything, or could if it were awake.
 #[inline]
 pub fn matter(a: u32, b: u32) -> bool {
     let both = a & b & aabb_body::LIVE != 0;
-    let one_moves = (a | b) & aabb_body::DYNAMIC != 0;
+    let one_moves = (a | b) & (aabb_body::DYNAMIC | aabb_body::ASLEEP) != 0;
     both && one_moves && (a ^ b) & aabb_body::INDEX != 0
 }
 

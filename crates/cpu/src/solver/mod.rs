@@ -195,7 +195,7 @@ impl PlainRows {
             match visit {
                 Visit::WarmStart => push::warm_start(head, tangents, points, impulses, &mut a, &mut b),
                 Visit::Solve | Visit::Relax => {
-                    soft::visit(visit, head, tangents, points, impulses, &mut a, &mut b, step);
+                    soft::visit(visit, head, tangents, points, impulses, [&mut a, &mut b], step);
                 }
                 Visit::Load => one_pass::load(head, tangents, points, impulses, &mut a, &mut b),
                 Visit::Pass => one_pass::pass(head, tangents, points, impulses, &mut a, &mut b, step),

@@ -15,8 +15,7 @@ pub(super) fn visit(
     tangents: [Vec3; 2],
     points: &mut [ConstraintPoint],
     impulses: &mut [Impulse],
-    a: &mut SolverBody,
-    b: &mut SolverBody,
+    [a, b]: [&mut SolverBody; 2],
     step: &StepParams,
 ) {
     for (point, impulse) in points.iter_mut().zip(impulses.iter_mut()) {

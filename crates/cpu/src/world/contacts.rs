@@ -1,6 +1,6 @@
 //! Contacts in bulk: see `tumble_core::contacts`.
 
-use super::World;
+use super::{World, asleep};
 use tumble_core::Result;
 use tumble_core::contacts::{Committed, Contacts};
 
@@ -14,11 +14,12 @@ impl World {
     pub fn contacts(&mut self) -> Result<Contacts> {
         self.failed.clone().map_or(Ok(()), Err)?;
         let kept = &self.kept;
+        let pairs = asleep::merged(&kept.pairs, &kept.asleep.pairs);
         let committed = Committed {
             step: &self.last_step,
             states: &kept.states,
             colliders: &kept.colliders,
-            pairs: &kept.pairs,
+            pairs: &pairs,
             batch_of_slot: &kept.batch_of_slot,
             found: &kept.found,
             memory: &kept.memory,

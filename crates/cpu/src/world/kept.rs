@@ -1,13 +1,15 @@
 //! What a world keeps, and a step of it: the plan phase, which writes nothing that lasts, and the commit.
 
-use crate::batch::{self, Batches};
+use super::asleep::{self, Asleep, Outcome, Waking};
+use crate::batch::{self, Batches, Ends};
 use crate::broadphase::{self, Boxes, Finder, Search, TooMany};
 use crate::contact::{self, Matched};
 use crate::shared::Shared;
 use crate::solver::{self, Rows, prepare, store};
-use crate::{bounds, continuous, edit, motion, narrowphase};
+use crate::{bounds, continuous, edit, motion, narrowphase, sleep};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{
     Aabb, BodyProps, BodyState, Collider, Control, FoundManifold, Impulse, Manifold, ManifoldMemory, Pair, PoseRecord,
@@ -35,6 +37,7 @@ pub(super) struct Kept {
     pub(super) poses: Vec<PoseRecord>,
     /// The solver's rows, kept for their room alone.
     pub(super) rows: Rows,
+    pub(super) asleep: Asleep,
 }
 
 /// What the plan phase of a step finds; nothing of it lasts unless the step commits.
@@ -44,6 +47,8 @@ pub(super) struct Planned {
     pub(super) manifolds: Vec<Manifold>,
     pub(super) batches: Batches,
     pub(super) control: Control,
+    ends: Vec<Ends>,
+    waking: Waking,
 }
 
 /// What a step is to do, beside its numbers.
@@ -92,7 +97,7 @@ impl Kept {
             + self.colliders.len() * collider
             + self.batch_of_slot.len() * slot
             + self.pairs.len() * pair;
-        counted as u64 + self.rows.bytes()
+        counted as u64 + self.rows.bytes() + self.asleep.bytes()
     }
 
     /// Everything up to the first write to what lives past the step.
@@ -106,14 +111,18 @@ impl Kept {
         let run = watch.begin("edit");
         let mut control = Control { step: step.step, colored_as: self.control.colored_as, ..Control::zeroed() };
         let states = self.edit(asked.edits, step);
-        let states = self.quarantine(states, &mut control);
+        let Asked { edits, params, broadphase } = *asked;
+        let mut states = self.quarantine(states, &mut control);
+        let (mut waking, woken) = self.wake_by_edits(edits, step, &mut states);
         let run = watch.next(run, "bounds");
         let aabbs: Vec<Aabb> =
             self.colliders.par_iter().with_min_len(256).map(|c| self.bounds(c, &states, step)).collect();
         let run = watch.next(run, "broadphase");
-        let Asked { edits, params, broadphase } = *asked;
         let boxes = Boxes::new(&aabbs);
-        let found = finder.find(&boxes, &Search { step, params, broadphase, stale: edits.stale });
+        let mut stale = edits.stale;
+        stale.moving |= self.asleep.changed || waking.any();
+        let mut found = finder.find(&boxes, &Search { step, params, broadphase, stale });
+        self.find_sleepers(&boxes, &states, &waking, step.pair_capacity, &mut found);
         let run = watch.next(run, "contact");
         control.pair_count = found.count.min(u32::MAX.into()) as u32;
         control.turns = found.turns;
@@ -126,14 +135,16 @@ impl Kept {
             Some(TooMany::Unbounded(count)) => return over("half-spaces", count, limits::UNBOUNDED_LIMIT),
             None => {}
         }
-        if control.pair_count > step.pair_capacity {
-            return over("pairs", control.pair_count, step.pair_capacity);
+        let with_asleep = control.pair_count.saturating_add(self.asleep.pairs_after(&waking));
+        if with_asleep > step.pair_capacity {
+            return over("pairs", with_asleep, step.pair_capacity);
         }
-        let matched = contact::match_pairs(&self.pairs, &found.pairs, &self.colliders, &self.free, step.step);
+        let old = if woken.is_empty() { Cow::from(&self.pairs) } else { asleep::merged(&self.pairs, &woken).into() };
+        let mut matched = contact::match_pairs(&old, &found.pairs, &self.colliders, &self.free, step.step);
         control.new_count = matched.new_count;
         control.dead_count = matched.dead_slots.len() as u32;
         let run = watch.next(run, "narrowphase");
-        let manifolds: Vec<Manifold> = matched
+        let mut manifolds: Vec<Manifold> = matched
             .pairs
             .par_iter()
             .enumerate()
@@ -143,6 +154,15 @@ impl Kept {
                 false => narrowphase::collide(pair, &self.colliders, &states, &self.found[pair.slot as usize], step),
             })
             .collect();
+        let woken = self.wake_by_touch(&matched.pairs, &manifolds, &mut states, &mut waking);
+        if !woken.is_empty() {
+            let collide = |pair: &Pair| {
+                narrowphase::collide(pair, &self.colliders, &states, &self.found[pair.slot as usize], step)
+            };
+            let theirs: Vec<Manifold> = woken.par_iter().with_min_len(64).map(collide).collect();
+            asleep::join(&mut matched.pairs, &mut manifolds, &woken, &theirs);
+            control.pair_count = matched.pairs.len() as u32;
+        }
         control.processed = control.pair_count - u32::from(step.drop_pair < control.pair_count);
         control.constraint_count = manifolds.iter().map(|m| u32::from(m.count > 0)).sum();
         control.point_count = manifolds.iter().map(|m| m.count).sum();
@@ -162,7 +182,7 @@ impl Kept {
         if control.last_count > step.last_limit {
             return over("last batch", control.last_count, step.last_limit);
         }
-        Ok(Planned { states, matched, manifolds, batches, control })
+        Ok(Planned { states, matched, manifolds, batches, control, ends, waking })
     }
 
     /// The working copy of the states with the step's edits applied.
@@ -188,15 +208,20 @@ impl Kept {
         states
     }
 
+    /// Those asleep are kept elsewhere, and are nowhere here.
     fn bounds(&self, collider: &Collider, states: &[BodyState], step: &StepParams) -> Aabb {
         let body = collider.body as usize;
+        if sleep::sleeps(states[body].flags) {
+            return bounds::NOWHERE;
+        }
         bounds::collider_bounds(collider, &states[body], &self.props[body], step)
     }
 
     /// Solves and writes everything that lives past the step.
     pub(super) fn commit(&mut self, planned: Planned, step: &StepParams, restitution: bool, watch: &mut Stopwatch) {
         let run = watch.begin("prepare");
-        let Planned { mut states, matched, manifolds, batches, mut control } = planned;
+        let Planned { mut states, matched, manifolds, batches, mut control, ends, waking } = planned;
+        let labels = self.labels(&states, &manifolds, &ends, step);
         let mut bodies: Vec<SolverBody> = (0..states.len())
             .into_par_iter()
             .with_min_len(256)
@@ -222,8 +247,8 @@ impl Kept {
             shares[body as usize] = shares[body as usize].min(share);
         }
         self.poses.resize(states.len(), PoseRecord::zeroed());
-        let ends = bodies.par_iter().zip(&self.props).zip(states.par_iter_mut().zip(&mut self.poses));
-        let bad = ends.enumerate().with_min_len(256).filter_map(|(slot, ((body, props), (state, pose)))| {
+        let moved = bodies.par_iter().zip(&self.props).zip(states.par_iter_mut().zip(&mut self.poses));
+        let bad = moved.enumerate().with_min_len(256).filter_map(|(slot, ((body, props), (state, pose)))| {
             let (new, bad) = motion::commit(body, state, shares[slot]);
             (*state, *pose) = (new, PoseRecord::of(&new, props));
             bad.then_some(slot)
@@ -231,6 +256,8 @@ impl Kept {
         bad.collect::<Vec<_>>().into_iter().for_each(|slot| name(&mut control, slot));
         self.states = states;
         self.pairs = matched.pairs;
+        let outcome = Outcome { labels, manifolds: &manifolds, ends: &ends, waking };
+        self.settle(outcome, step, &mut control);
         control.frozen_count = self
             .states
             .iter()

@@ -1,5 +1,6 @@
 //! A world on the CPU: the face, capacity and the edit log. What it keeps, and the order of the passes, is in `kept`.
 
+mod asleep;
 mod contacts;
 mod kept;
 mod queries;
@@ -7,6 +8,7 @@ mod queries;
 use crate::broadphase::Finder;
 use crate::query;
 use crate::solver::Rows;
+use asleep::Asleep;
 use bytemuck::Zeroable;
 use glam::Vec3;
 use kept::{Asked, Kept, Overflow};
@@ -68,6 +70,7 @@ impl World {
             memory: Vec::new(),
             found: Vec::new(),
             rows: Rows::default(),
+            asleep: Asleep::default(),
         };
         let (bodies, colliders) = (kept.states.len() as u32, kept.colliders.len() as u32);
         kept.reserve_pairs(limits::initial_pairs(&params.capacities, colliders))?;
@@ -153,6 +156,12 @@ impl World {
         step.cell_table_bits = limits::cell_table_bits(step.collider_count);
         step.large_limit = limits::large_limit(step.collider_count, self.editor.spread().is_wide());
         step.drop_pair = self.drop_pair;
+        if self.kept.is_idle(&edits, &step) {
+            self.kept.pass_time(&step);
+            self.last_step.step = step.step;
+            self.finish(self.watch.runs().len(), self.report.broadphase);
+            return Ok(());
+        }
         self.failed = self.run(&edits, step, &span).err();
         if let Some(error) = self.failed.clone() {
             self.editor.put_back(edits);

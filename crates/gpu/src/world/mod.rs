@@ -18,7 +18,7 @@ use tumble_core::edit::EditBatch;
 use tumble_core::layout::{Control, LAST_BATCH, Pair, PoseRecord, StepParams};
 use tumble_core::limits::{self, Room};
 use tumble_core::stopwatch::{Span, Stopwatch};
-use tumble_core::{Editor, Params, Poses, Result, Scene, StageRun, StageTime, StepReport};
+use tumble_core::{Editor, Params, Plan, Poses, Result, Scene, StageRun, StageTime, StepReport};
 
 /// Steps in flight before `step` waits.
 const IN_FLIGHT: usize = 3;
@@ -59,8 +59,13 @@ pub struct World {
     last_step: StepParams,
     /// Most pairs that a step had.
     most_pairs: u32,
-    /// Batches that were worth a dispatch in the step of this number, for the last few.
-    batches: VecDeque<(u32, u32)>,
+    /// Of the last few steps: the number, how many batches were worth a dispatch, and how many bodies were awake where
+    /// they may sleep.
+    known: VecDeque<(u32, u32, u32)>,
+    /// Gravity and speculative distance of the last step, as bits, if bodies could sleep in it.
+    told: Option<[u32; 4]>,
+    /// The last step that had edits, or woke all.
+    disturbed: u32,
     /// Constraints from which on a batch is worth one.
     wide: u32,
     /// Dispatches that the last submission recorded.
@@ -80,6 +85,8 @@ struct Record {
     step: StepParams,
     edits: EditBatch,
     wants: Built,
+    /// It was submitted as a step in which nothing is awake.
+    idle: bool,
 }
 
 impl World {
@@ -118,13 +125,15 @@ impl World {
         let (bodies, colliders) = (packed.states.len() as u32, packed.colliders.len() as u32);
         let pairs = limits::initial_pairs(&within(&gpu, &params), colliders);
         let room = Room::first(&params.capacities, bodies, colliders);
-        let sizes = Sizes { bodies: room.bodies, colliders: room.colliders, pairs };
+        let sleepers = if params.sleep.is_some() { room.bodies } else { 0 };
+        let sizes = Sizes { bodies: room.bodies, colliders: room.colliders, pairs, sleepers };
         let buffers = store::create(&gpu, &packed, &sizes, room.edits)?;
         let poses: Vec<PoseRecord> =
             packed.states.iter().zip(&packed.props).map(|(s, p)| PoseRecord::of(s, p)).collect();
         gpu.queue.write_buffer(buffers.buffer("poses")?, 0, bytemuck::cast_slice(&poses));
         let solver = params.step_params(0, Vec3::ZERO).solver;
-        let built = Built { plan: packed.plan, choice: Choice::new(&params, &editor), solver };
+        let plan = with_sleep(packed.plan, &params);
+        let built = Built { plan, choice: Choice::new(&params, &editor), solver };
         let stages = {
             let _span = Span::enter("pipelines");
             Stages::new(&gpu, &mut pipelines, &sizes, &built)?
@@ -142,7 +151,9 @@ impl World {
             last: Control::zeroed(),
             last_step: StepParams::zeroed(),
             most_pairs: 0,
-            batches: VecDeque::new(),
+            known: VecDeque::new(),
+            told: None,
+            disturbed: 0,
             wide: WIDE,
             dispatches: 0,
             extent: None,
@@ -261,12 +272,20 @@ impl World {
         step.collider_count = colliders;
         step.edit_ranges = edits.ranges.len() as u32;
         step.cell_table_bits = limits::cell_table_bits(colliders);
+        let plan = with_sleep(self.editor.plan(), &self.params);
         let choice = Choice::new(&self.params, &self.editor);
-        let wants = Built { plan: self.editor.plan(), choice, solver: step.solver };
+        let wants = Built { plan, choice, solver: step.solver };
         step.large_limit = limits::large_limit(colliders, wants.choice.large_tree);
         step.drop_pair = std::mem::replace(&mut self.drop_pair, u32::MAX);
+        let [x, y, z] = step.gravity;
+        let told = self.params.sleep.map(|_| [x, y, z, step.speculative_distance].map(f32::to_bits));
+        step.wake_all = u32::from(told != self.told);
+        self.told = told;
+        if step.wake_all != 0 || !edits.records.is_empty() {
+            self.disturbed = step.step;
+        }
         self.submitted += 1;
-        self.submit(Record { step, edits, wants })
+        self.submit(Record { step, edits, wants, idle: false })
     }
 
     /// Waits for all submitted steps; the last one's report.
@@ -303,6 +322,10 @@ impl World {
         if widened || (wanted.choice, wanted.solver) != (choice, solver) {
             (wanted.choice, wanted.solver) = (choice, solver);
             let run = self.watch.begin("pipelines");
+            if wanted.plan.islands && self.sizes.sleepers == 0 {
+                self.sizes.sleepers = self.sizes.bodies;
+                store::grow(&self.gpu, &mut self.buffers, &self.sizes)?;
+            }
             self.stages = Stages::new(&self.gpu, &mut self.pipelines, &self.sizes, &wanted)?;
             self.watch.end(run);
             self.built = wanted;
@@ -311,15 +334,23 @@ impl World {
         step.pair_capacity = self.sizes.pairs;
         // The report of exactly three steps ago, so that no decision hangs on what has arrived. (It only decides which
         // dispatch a batch is in: the bits are the same.)
-        let known = self.batches.iter().find(|(number, _)| number + IN_FLIGHT as u32 == step.step);
-        step.wide_batches = known.map_or(WIDE_BATCHES, |(_, count)| *count);
+        let known = self.known.iter().find(|(number, ..)| number + limits::STATUS_DELAY == step.step);
+        step.wide_batches = known.map_or(WIDE_BATCHES, |(_, count, _)| *count);
+        // Nothing was awake then, and nothing has happened since that could wake anybody.
+        let undisturbed = self.disturbed + limits::STATUS_DELAY <= step.step;
+        record.idle = undisturbed && known.is_some_and(|(.., awake)| *awake == 0);
         let run = self.watch.begin("upload");
         self.upload(&record)?;
-        self.stages.prepare(&self.gpu, &record.step, record.edits.stale)?;
+        if !record.idle {
+            self.stages.prepare(&self.gpu, &record.step, record.edits.stale)?;
+        }
         let run = self.watch.next(run, "record");
         let timer = if self.params.profile { self.timer.as_mut() } else { None };
         let mut recorder = Recorder::new(&self.gpu, &self.buffers, &mut self.cache, timer);
-        self.stages.record(&mut recorder, &self.buffers, &record.step)?;
+        match record.idle {
+            true => self.stages.record_idle(&mut recorder)?,
+            false => self.stages.record(&mut recorder, &self.buffers, &record.step)?,
+        }
         self.statuses.copy(recorder.encoder(), self.buffers.buffer("control")?, 0);
         self.dispatches = recorder.dispatches();
         let run = self.watch.next(run, "submit");
@@ -360,12 +391,15 @@ impl World {
                 if (status.step + limits::STATUS_DELAY).is_multiple_of(limits::LOOK_EVERY) {
                     self.extent = Some((status.step, extent_of(&status)));
                 }
-                self.stages.broadphase.walked(record.step.step, status.turns);
-                self.batches.push_back((record.step.step, wide_batches(&status, self.wide)));
+                if !record.idle {
+                    self.stages.broadphase.walked(record.step.step, status.turns);
+                }
+                let awake = if record.step.sleep_distance >= 0.0 { status.awake } else { u32::MAX };
+                self.known.push_back((record.step.step, wide_batches(&status, self.wide), awake));
                 self.last_step = record.step;
                 self.most_pairs = self.most_pairs.max(status.old_pair_count);
-                if self.batches.len() > 2 * IN_FLIGHT {
-                    self.batches.pop_front();
+                if self.known.len() > 2 * IN_FLIGHT {
+                    self.known.pop_front();
                 }
             }
             self.last = status;
@@ -379,6 +413,11 @@ impl World {
         }
         self.gpu.check()
     }
+}
+
+/// The plan with what sleep needs.
+fn with_sleep(plan: Plan, params: &Params) -> Plan {
+    Plan { islands: plan.islands || params.sleep.is_some(), ..plan }
 }
 
 /// How many of the first batches have a dispatch of their own: up to the last that is worth one.

@@ -64,6 +64,11 @@ impl Tree {
         }
     }
 
+    /// Offers the colliders of all leaves whose boxes overlap `own`; returns the turns.
+    pub(crate) fn overlapping(&self, own: &Aabb, offer: &mut impl FnMut(u32)) -> u32 {
+        self.walk_by_escapes(root_of(self.count()), NO_NODE, own, offer)
+    }
+
     /// Offers the colliders of all leaves below node `top` whose boxes overlap `own`; returns the turns, those `before`
     /// included.
     fn walk(&self, top: u32, own: &Aabb, traversal: Traversal, before: u32, offer: &mut impl FnMut(u32)) -> u32 {
