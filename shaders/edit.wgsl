@@ -93,6 +93,9 @@ fn apply_to_collider(record: EditRecord) -> Collider {
     collider.restitution = bitcast<f32>(record.data[3].y);
     collider.combine = record.data[3].z;
     collider.born = step.step;
+    collider.surface_velocity = xyz(record.data[4]);
+    collider.rolling_resistance = bitcast<f32>(record.data[4].w);
+    collider.twisting_resistance = bitcast<f32>(record.data[5].x);
     return collider;
 }
 

@@ -80,7 +80,8 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             inverse_inertia_diagonal, pad_b, inverse_inertia_off, pad_c, linear_start, weight, angular_start, weighted
         }
         PoseRecord { translation, tag, rotation }
-        Collider { size, shape, position, body, rotation, friction, restitution, combine, born }
+        Collider { size, shape, position, body, rotation, friction, restitution, combine, born, surface_velocity,
+            rolling_resistance, twisting_resistance, pad_a, pad_b, pad_c }
         Aabb { min, body, max, class }
         Pair { a, b, slot, kind }
         ManifoldPoint { anchor, separation }
@@ -88,13 +89,14 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         FoundManifold { rotation_a, rotation_b, manifold }
         ConstraintHead {
             normal, friction, body_a, body_b, slot, count, restitution, bias_rate, mass_scale, impulse_scale,
-            remembered, round_a, round_b, pad_a, between, pad_b
+            remembered, round_a, round_b, rolling_resistance, between, twisting_resistance, resisted, rolling_inertia,
+            surface_velocity, twisting_inertia, pad_a
         }
         ConstraintPoint {
             anchor, adjusted_separation, normal_mass, tangent_mass, approach, deviation, total, pad_b
         }
         Impulse { normal, tangent, feature }
-        ManifoldMemory { remembered, pad_a, pad_b, pad_c, deviations, totals }
+        ManifoldMemory { remembered, resisted, deviations, totals }
         Control {
             stop, overflow, needed, step, old_pair_count, free_count, colored_as, frozen_count, pair_count, processed,
             new_count, dead_count, constraint_count, point_count, batch_count, rounds, unplaced, last_count,

@@ -133,7 +133,7 @@ type Outcome = (Vec<SolverBody>, Vec<Vec<[u32; 3]>>);
 fn all_bits(solved: &Solved, points: usize) -> Vec<[u32; 3]> {
     let impulses = solved.impulses[..points].iter().map(|(normal, [x, y])| [*normal, *x, *y]);
     let deviations = solved.deviations[..points].iter().map(|d| [*d, 0.0, 0.0]);
-    let memory = deviations.chain([[solved.remembered, 0.0, 0.0]]);
+    let memory = deviations.chain([[solved.remembered, 0.0, 0.0], solved.resisted]);
     let rest = solved.totals[..points].iter().copied().chain(memory);
     impulses.chain(rest).map(|three| three.map(f32::to_bits)).collect()
 }
@@ -174,7 +174,7 @@ fn four_at_a_time() {
             let lanes: Outcome = {
                 let mut bodies = cpu.bodies(&frame);
                 let mut rows = Rows::default();
-                rows.build(start, &cpu.colliders, &bodies, &frame.step, |c| cpu.contact(&frame, c));
+                rows.build(start, &cpu.colliders, &bodies, &frame.states, &frame.step, |c| cpu.contact(&frame, c));
                 let moving = Bodies { solver: &mut bodies, states: &frame.states, props: &cpu.props };
                 threads.install(|| solve(&mut rows, moving, &frame.step, true));
                 let used = std::sync::Mutex::new(vec![Vec::new(); order.len()]);

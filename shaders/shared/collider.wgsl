@@ -22,6 +22,12 @@ struct Collider {
     restitution: f32,
     combine: u32,
     born: u32,
+    surface_velocity: vec3<f32>,
+    rolling_resistance: f32,
+    twisting_resistance: f32,
+    pad_a: u32,
+    pad_b: u32,
+    pad_c: u32,
 }
 
 struct Aabb {

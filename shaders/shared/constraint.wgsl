@@ -14,9 +14,14 @@ struct ConstraintHead {
     remembered: f32,
     round_a: f32,
     round_b: f32,
-    pad_a: u32,
+    rolling_resistance: f32,
     between: vec3<f32>,
-    pad_b: u32,
+    twisting_resistance: f32,
+    resisted: vec3<f32>,
+    rolling_inertia: f32,
+    surface_velocity: vec2<f32>,
+    twisting_inertia: f32,
+    pad_a: u32,
 }
 
 struct ConstraintPoint {
@@ -39,9 +44,12 @@ struct Impulse {
 
 struct ManifoldMemory {
     remembered: f32,
-    pad_a: u32,
-    pad_b: u32,
-    pad_c: u32,
+    resisted: array<f32, 3>,
     deviations: array<f32, 4>,
     totals: array<array<f32, 3>, 4>,
+}
+
+// Whether rolling or twisting is resisted.
+fn resists(head: ConstraintHead) -> bool {
+    return head.rolling_resistance > 0.0 || head.twisting_resistance > 0.0;
 }

@@ -1,7 +1,7 @@
 // The sweeps over constraints, batch by batch; the laws of a visit are in `solver/soft` and `solver/one_pass`.
 // Twin of crates/cpu/src/solver/mod.rs (`PlainRows::sweep`).
 //
-// Reads and writes `heads` (what they remember), `points`, `impulses` and `solver_bodies` (velocities, and what the
+// Reads and writes `heads` (what they remember and resist), `points`, `impulses` and `solver_bodies` (velocities, and what the
 // sub-step began with). Constraints of one batch share no moving body, so each has a thread of its own:
 //
 //   warm_start, solve, relax (soft), load, one_pass (one pass), restitution
@@ -13,6 +13,7 @@
 // last batch 9 for each of the 128, and one a thread.
 
 //#import solver/one_pass.wgsl
+//#import solver/resist.wgsl
 //#import solver/soft.wgsl
 //#import solver/sweep.wgsl
 
@@ -30,6 +31,7 @@ fn visit(kind: u32, c: u32) {
     let t = tangents(head.normal);
     let first = 4u * c;
     let end = first + min(head.count, 4u);
+    var sum = 0.0;
     var p = first;
     loop {
         var point = points[p];
@@ -44,6 +46,7 @@ fn visit(kind: u32, c: u32) {
             // It seldom changes, and a write that is not made costs nothing.
             let lowest = point.approach;
             push_normal(kind, head, &point, &impulse, &a, &b, step);
+            sum += impulse.normal;
             impulses[p].normal = impulse.normal;
             if point.approach < lowest {
                 points[p].approach = point.approach;
@@ -53,6 +56,9 @@ fn visit(kind: u32, c: u32) {
             p++;
             break if p >= end;
         }
+    }
+    if kind == WARM_START {
+        warm_start_resistance(head, t, &a, &b);
     }
     if kind == SOLVE || kind == RELAX {
         p = first;
@@ -68,6 +74,9 @@ fn visit(kind: u32, c: u32) {
                 p++;
                 break if p >= end;
             }
+        }
+        if resists(head) {
+            heads[c].resisted = resist(head, t, sum, &a, &b);
         }
     }
     if a.inverse_mass > 0.0 {
@@ -100,6 +109,10 @@ fn load_constraint(c: u32) {
             break if p >= end;
         }
     }
+    warm_start_resistance(head, t, &a, &b);
+    let twist = head.resisted.x;
+    let rolling = head.resisted.yz;
+    weight += over(twist * twist, head.twisting_inertia) + over(dot(rolling, rolling), head.rolling_inertia);
     let own = eigenvalues(&a, &b);
     if a.inverse_mass > 0.0 {
         solver_bodies[head.body_a].linear_velocity = a.linear_velocity;
@@ -171,6 +184,9 @@ fn pass_over(c: u32) {
             p++;
             break if p >= end;
         }
+    }
+    if resists(head) {
+        heads[c].resisted = resist(head, t, sum, &a, &b);
     }
     if a.inverse_mass > 0.0 {
         solver_bodies[head.body_a].linear_velocity = a.linear_velocity;

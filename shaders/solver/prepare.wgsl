@@ -2,7 +2,8 @@
 //
 //   bodies        one thread a body: `solver_bodies` from `work_states`, `props` and `masks` (the batches it is in); all of
 //                 its way in `shares`
-//   constraints   one thread a constraint, in batch order: `heads` and `points` from the manifold of its pair
+//   constraints   one thread a constraint, in batch order: `heads` and `points` from the manifold of its pair;
+//                 belts turn as in `work_states`
 //   carry         the same: `impulses`, those of `slot_impulses` for points whose features stayed; `slot_memory`
 //
 // The masses that a point sees are as in Catto, "Iterative Dynamics with Temporal Coherence" (GDC 2005).
@@ -18,6 +19,7 @@
 //#import shared/thread.wgsl
 
 const NO_FEATURE: u32 = 0xffffffffu;
+const NO_RADIUS: f32 = 1e30; // m: more than any
 
 @group(0) @binding(0) var<uniform> control: Control;
 @group(0) @binding(1) var<uniform> step: StepParams;
@@ -127,6 +129,28 @@ fn round_part(collider: u32, separation: f32) -> f32 {
     return 0.0;
 }
 
+// The radius that resistance is a share of: that of the smaller ball; where there is none, the smallest half extent.
+fn lever(a: u32, b: u32) -> f32 {
+    let ball = colliders[a].shape == SHAPE_BALL || colliders[b].shape == SHAPE_BALL;
+    return min(radius_of(a, ball), radius_of(b, ball));
+}
+
+fn radius_of(collider: u32, ball: bool) -> f32 {
+    let size = colliders[collider].size;
+    if colliders[collider].shape == SHAPE_BALL {
+        return size.x;
+    }
+    if colliders[collider].shape == SHAPE_CUBOID && !ball {
+        return min(min(size.x, size.y), size.z);
+    }
+    return NO_RADIUS;
+}
+
+// Change of relative angular velocity about `v` by a unit angular impulse about `u`.
+fn turning(a: SolverBody, b: SolverBody, u: vec3<f32>, v: vec3<f32>) -> f32 {
+    return dot(v, inverse_inertia_times(a, u) + inverse_inertia_times(b, u));
+}
+
 @compute @workgroup_size(256)
 fn constraints(
     @builtin(workgroup_id) wg: vec3<u32>,
@@ -200,6 +224,26 @@ fn constraints(
     head.round_a = round_a;
     head.round_b = round_b;
     head.between = between;
+    head.rolling_resistance = max(colliders[pair.a].rolling_resistance, colliders[pair.b].rolling_resistance);
+    head.twisting_resistance = max(colliders[pair.a].twisting_resistance, colliders[pair.b].twisting_resistance);
+    if resists(head) {
+        let radius = lever(pair.a, pair.b);
+        head.rolling_resistance *= radius;
+        head.twisting_resistance *= radius;
+        let k11 = turning(a, b, t[0], t[0]);
+        let k12 = turning(a, b, t[0], t[1]);
+        let k22 = turning(a, b, t[1], t[1]);
+        // As for friction: isotropic, and never too far.
+        let slightest = 0.5 * (k11 + k22) + sqrt(0.25 * (k11 - k22) * (k11 - k22) + k12 * k12);
+        head.rolling_inertia = inverse(slightest);
+        head.twisting_inertia = inverse(turning(a, b, normal, normal));
+    }
+    let belt_a = colliders[pair.a].surface_velocity;
+    let belt_b = colliders[pair.b].surface_velocity;
+    if any(belt_a != vec3<f32>()) || any(belt_b != vec3<f32>()) {
+        let velocity = rotate(work_states[body_b].rotation, belt_b) - rotate(work_states[body_a].rotation, belt_a);
+        head.surface_velocity = vec2<f32>(dot(t[0], velocity), dot(t[1], velocity));
+    }
     heads[c] = head;
 }
 
@@ -223,7 +267,13 @@ fn carry(
         slot_impulses[first + 3u].feature,
     );
     if !fresh && stored.x != NO_FEATURE {
-        heads[c].remembered = slot_memory[next_pairs[index].slot].remembered / f32(manifolds[index].count);
+        let slot = next_pairs[index].slot;
+        heads[c].remembered = slot_memory[slot].remembered / f32(manifolds[index].count);
+        // Solvers that do not resist must not go on with what others left.
+        if step.solver <= SOLVER_SOFT {
+            let resisted = slot_memory[slot].resisted;
+            heads[c].resisted = vec3<f32>(resisted[0], resisted[1], resisted[2]);
+        }
     }
     for (var i = 0u; i < min(manifolds[index].count, 4u); i++) {
         var impulse: Impulse;

@@ -83,8 +83,8 @@ fn push_tangent(
 ) {
     let r = arms(head, point);
     let slide = relative_velocity(a, b, r[0], r[1]);
-    var x = (*impulse).tangent[0] - (*point).tangent_mass * dot(t[0], slide);
-    var y = (*impulse).tangent[1] - (*point).tangent_mass * dot(t[1], slide);
+    var x = (*impulse).tangent[0] - (*point).tangent_mass * (dot(t[0], slide) + head.surface_velocity.x);
+    var y = (*impulse).tangent[1] - (*point).tangent_mass * (dot(t[1], slide) + head.surface_velocity.y);
     let size = sqrt(x * x + y * y);
     let most = head.friction * (*impulse).normal;
     if size > most {

@@ -30,6 +30,8 @@ fn store(
     let count = heads[c].count;
     var memory: ManifoldMemory;
     memory.remembered = heads[c].remembered * f32(count);
+    let resisted = heads[c].resisted;
+    memory.resisted = array<f32, 3>(resisted.x, resisted.y, resisted.z);
     for (var i = 0u; i < min(count, 4u); i++) {
         let total = points[4u * c + i].total;
         memory.deviations[i] = points[4u * c + i].deviation;

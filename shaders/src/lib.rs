@@ -67,6 +67,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("solver/penalty", include_str!("../solver/penalty.wgsl")),
     ("solver/prepare", include_str!("../solver/prepare.wgsl")),
     ("solver/push", include_str!("../solver/push.wgsl")),
+    ("solver/resist", include_str!("../solver/resist.wgsl")),
     ("solver/soft", include_str!("../solver/soft.wgsl")),
     ("solver/store", include_str!("../solver/store.wgsl")),
     ("solver/sweep", include_str!("../solver/sweep.wgsl")),

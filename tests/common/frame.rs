@@ -53,7 +53,7 @@ pub(crate) fn scene_of(bodies: usize) -> Scene {
 }
 
 impl Cpu {
-    /// The scene, and in it something of everything: forces, damping, bounces, kinematic and frozen bodies.
+    /// The scene, and in it something of everything: forces, damping, bounces, resistance, belts, kinematic and frozen bodies.
     pub(crate) fn new(scene: &Scene) -> Self {
         let packed = PackedScene::new(scene).unwrap();
         let mut cpu = Self {
@@ -94,6 +94,9 @@ impl Cpu {
         for (i, collider) in cpu.colliders.iter_mut().enumerate() {
             collider.restitution = [0.0, 0.6, 0.0, 0.3][i % 4];
             collider.combine = (i as u32 / 2) % 16;
+            collider.rolling_resistance = [0.0, 0.1, 0.0, 0.0, 0.4][i % 5];
+            collider.twisting_resistance = [0.0, 0.0, 0.2, 0.0][i % 4];
+            collider.surface_velocity = [[0.0; 3], [0.0; 3], [0.6, 0.1, -0.3]][i % 3];
         }
         cpu
     }
@@ -152,7 +155,7 @@ impl Cpu {
 
     pub(crate) fn rows(&self, frame: &Frame, bodies: &[SolverBody]) -> PlainRows {
         PlainRows::build(0..frame.batches.order.len(), |c| {
-            prepare_constraint(&self.contact(frame, c), &self.colliders, bodies, &frame.step)
+            prepare_constraint(&self.contact(frame, c), &self.colliders, bodies, &frame.states, &frame.step)
         })
     }
 

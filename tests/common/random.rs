@@ -81,7 +81,8 @@ impl Random {
         let (friction, restitution) = (self.range(0.0, 1.0), self.range(0.0, 1.0));
         let position = self.vector(0.2).to_array();
         let rotation = rotation.to_array();
-        Collider { size, shape, position, body, rotation, friction, restitution, combine, born: 0 }
+        let rest = Collider::zeroed();
+        Collider { size, shape, position, body, rotation, friction, restitution, combine, ..rest }
     }
 }
 

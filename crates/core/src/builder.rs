@@ -180,6 +180,12 @@ pub struct ColliderBuilder {
     pub friction: f32,
     /// 0 to 1.
     pub restitution: f32,
+    /// Largest rolling torque over normal force and radius.
+    pub rolling_resistance: f32,
+    /// Largest torque about the normal over normal force and radius.
+    pub twisting_resistance: f32,
+    /// Of the surface against the body, in the body's frame, m/s.
+    pub surface_velocity: Vec3,
     /// How friction combines.
     pub friction_rule: CombineRule,
     /// How restitution combines.
@@ -197,6 +203,9 @@ impl ColliderBuilder {
             mass: None,
             friction: 0.5,
             restitution: 0.0,
+            rolling_resistance: 0.0,
+            twisting_resistance: 0.0,
+            surface_velocity: Vec3::ZERO,
             friction_rule: CombineRule::Average,
             restitution_rule: CombineRule::Average,
         }
@@ -234,7 +243,9 @@ impl ColliderBuilder {
         self.mass = Some(mass);
         self
     }
-    /// Coulomb coefficient; 0.5 at first.
+    /// Coulomb coefficient, the same in all directions; 0.5 at first. Friction that depends on the direction is left out
+    /// on purpose: every point would carry an ellipse in the frame of one of the two surfaces, and whose it is, is no
+    /// property of a collider. For belts and tracks there is [`surface_velocity`](Self::surface_velocity).
     pub fn friction(mut self, friction: f32) -> Self {
         self.friction = friction;
         self
@@ -242,6 +253,37 @@ impl ColliderBuilder {
     /// 0 (stays) to 1 (bounces back as fast as it came); 0 at first.
     pub fn restitution(mut self, restitution: f32) -> Self {
         self.restitution = restitution;
+        self
+    }
+    /// How hard it is to roll: the largest rolling torque is this times the radius times the normal force; 0 at first. A
+    /// ball of mass m that rolls on a plane loses 5/7 `resistance` g of its speed each second, and rests on slopes up to
+    /// atan(`resistance`).
+    ///
+    /// The radius is the ball's, of two balls the smaller one's; where no ball takes part, the smallest half extent of
+    /// the boxes. Of the two colliders' coefficients the larger counts, since sand slows whatever rolls over it.
+    ///
+    /// `rollingResistance` of Box2D 3 and Box3D is dimensionless too, and the larger of the two counts as well; they take
+    /// the larger radius, and a quarter of its inner radius for a hull. MuJoCo's rolling friction is a length: this times
+    /// the radius.
+    ///
+    /// [`Solver::OnePass`](crate::Solver::OnePass) and [`Solver::Soft`](crate::Solver::Soft) have it; the other solvers do
+    /// not resist.
+    pub fn rolling_resistance(mut self, resistance: f32) -> Self {
+        self.rolling_resistance = resistance;
+        self
+    }
+    /// How hard it is to turn about the normal of a contact, beside what friction does at the points: the largest torque
+    /// is this times the radius times the normal force; 0 at first. Radius and the larger coefficient as for
+    /// [`rolling_resistance`](Self::rolling_resistance). A ball touches at one point, where friction has no arm: only
+    /// this ends its spin. MuJoCo's torsional friction is a length: this times the radius.
+    pub fn twisting_resistance(mut self, resistance: f32) -> Self {
+        self.twisting_resistance = resistance;
+        self
+    }
+    /// Velocity of the surface against its body, as of a conveyor belt, in the body's frame, m/s; zero at first. Its part
+    /// along the contact is what friction pulls the other body to; nothing moves by it.
+    pub fn surface_velocity(mut self, velocity: Vec3) -> Self {
+        self.surface_velocity = velocity;
         self
     }
     /// How friction combines with that of the other collider.
@@ -266,7 +308,14 @@ impl ColliderBuilder {
             None => check(positive(self.density), what, "density", self.density, POSITIVE)?,
         }
         check((0.0..=1e6).contains(&self.friction), what, "friction", self.friction, "a finite number from 0 to 1e6")?;
-        check((0.0..=1.0).contains(&self.restitution), what, "restitution", self.restitution, "0 to 1")
+        check((0.0..=1.0).contains(&self.restitution), what, "restitution", self.restitution, "0 to 1")?;
+        for (field, resistance) in
+            [("rolling_resistance", self.rolling_resistance), ("twisting_resistance", self.twisting_resistance)]
+        {
+            const RESISTANCE: &str = "a finite number from 0 to 1e6 (seldom above 1: it is a share of the radius)";
+            check((0.0..=1e6).contains(&resistance), what, field, resistance, RESISTANCE)?;
+        }
+        check_speed(self.surface_velocity, what, "surface_velocity")
     }
 
     /// `combine` of [`layout::Collider`](crate::layout::Collider).

@@ -339,14 +339,10 @@ impl Editor {
     }
 
     fn push_collider(&mut self, op: u32, slot: usize, collider: &Collider) {
-        let words: [[u32; 4]; 4] = bytemuck::cast(*collider);
-        self.records.push(EditRecord {
-            op,
-            target: slot as u32,
-            kind: 0,
-            generation: 0,
-            data: [words[0], words[1], words[2], words[3], [0; 4], [0; 4], [0; 4]],
-        });
+        let words: [[u32; 4]; 6] = bytemuck::cast(*collider);
+        let mut record = EditRecord { op, target: slot as u32, ..EditRecord::zeroed() };
+        record.data[..6].copy_from_slice(&words);
+        self.records.push(record);
     }
 }
 

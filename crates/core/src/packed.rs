@@ -102,6 +102,10 @@ pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<PackedBody> {
                 restitution: c.restitution,
                 combine: c.combine(),
                 born: 0,
+                surface_velocity: (to_principal * c.surface_velocity).to_array(),
+                rolling_resistance: c.rolling_resistance,
+                twisting_resistance: c.twisting_resistance,
+                ..Collider::zeroed()
             };
             (handle.slot(), collider)
         })

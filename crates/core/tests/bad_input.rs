@@ -91,6 +91,13 @@ fn collider_fields() {
     for bad in [NAN, INF, -INF, -0.1] {
         bad_collider(ball().friction(bad), "friction");
         bad_collider(ball().restitution(bad), "restitution");
+        bad_collider(ball().rolling_resistance(bad), "rolling_resistance");
+        bad_collider(ball().twisting_resistance(bad), "twisting_resistance");
+    }
+    bad_collider(ball().rolling_resistance(2e6), "rolling_resistance");
+    bad_collider(ball().twisting_resistance(2e6), "twisting_resistance");
+    for bad in [NAN, INF, -INF, 2e6].into_iter().flat_map(in_each_place) {
+        bad_collider(ball().surface_velocity(bad), "surface_velocity");
     }
     bad_collider(ball().restitution(1.1), "restitution");
     for bad in [NAN, INF, -2e7].into_iter().flat_map(in_each_place) {
@@ -106,6 +113,8 @@ fn edges_are_allowed() {
     for collider in [
         ColliderBuilder::ball(1e-3).friction(0.0).restitution(1.0),
         ColliderBuilder::cuboid(1e3, 1e-3, 1.0).friction(1e6).restitution(0.0),
+        ColliderBuilder::ball(1.0).rolling_resistance(1e6).twisting_resistance(1e6),
+        ColliderBuilder::ball(1.0).surface_velocity(Vec3::splat(-1e6)),
         ColliderBuilder::ball(1.0).mass(1e12),
     ] {
         scene.try_insert(body().linear_damping(0.0).gravity_scale(-1.0), collider).unwrap();

@@ -61,7 +61,6 @@ fn stacks_touch_exactly() {
         (scenes::many_pyramids(9, 10), "many pyramids"),
         (scenes::large_on_small(), "large on small"),
         (scenes::hub(500), "hub"),
-        (scenes::ball_column(30), "ball column"),
     ] {
         let poses = initial_poses(&scene);
         assert_eq!(penetration(&scene, &poses).max_m, 0.0, "{name}");
@@ -188,6 +187,15 @@ fn small_scenes_pack_and_hand_back_their_bodies() {
     assert_eq!((dynamic(&scene), overlap(&scene), v(&scene, body)), (1, 0.0, Vec3::X * 5.0));
     let (scene, body) = scenes::slip_to_roll(0.4, 5.0);
     assert_eq!((dynamic(&scene), overlap(&scene), v(&scene, body)), (1, 0.0, Vec3::X * 5.0));
+    let (scene, body) = scenes::rolling_ball(0.1, 3.0);
+    let (builder, collider) = (scene.body(body).unwrap(), scene.colliders_of(body).unwrap()[0].1);
+    assert_eq!((builder.linvel, builder.angvel), (Vec3::X * 3.0, Vec3::Z * -6.0));
+    assert_eq!((collider.rolling_resistance, collider.twisting_resistance), (0.1, 0.0));
+    let (scene, body) = scenes::conveyor(0.3, Vec3::X);
+    assert!(overlap(&scene) == 0.0 && scene.body(body).unwrap().linvel == Vec3::ZERO);
+    assert!(overlap(&scenes::ball_column(30, 0.1)) < 1e-5 && dynamic(&scenes::ball_column(30, 0.1)) == 30);
+    let (scene, [ball, slab]) = scenes::spinning(0.1, 6.0);
+    assert!([ball, slab].iter().all(|&body| scene.body(body).unwrap().angvel == Vec3::Y * 6.0));
     let (scene, body) = scenes::bouncing_ball(0.8, 2.0);
     assert_eq!((dynamic(&scene), at(&scene, body)), (1, Vec3::Y * 2.5));
     assert!(PackedScene::new(&scene).unwrap().plan.restitution);

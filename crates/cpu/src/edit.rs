@@ -31,7 +31,8 @@ pub fn apply(range: EditRange, records: &[EditRecord], step: u32, targets: &mut 
 }
 
 fn apply_to_collider(record: &EditRecord, step: u32, collider: &mut Collider) {
-    let words: [[u32; 4]; 4] = [record.data[0], record.data[1], record.data[2], record.data[3]];
+    let mut words = [[0u32; 4]; 6];
+    words.copy_from_slice(&record.data[..6]);
     *collider = bytemuck::cast(words);
     collider.born = step;
 }

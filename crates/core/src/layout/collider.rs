@@ -26,7 +26,7 @@ pub mod aabb_body {
     pub const LIVE: u32 = 0x4000_0000;
 }
 
-/// A shape on a body. 64 bytes.
+/// A shape on a body. 96 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Collider {
@@ -48,6 +48,18 @@ pub struct Collider {
     pub combine: u32,
     /// Step in which it was inserted: its contacts of earlier steps were someone else's.
     pub born: u32,
+    /// Of its surface against the body, in the body's principal frame, m/s.
+    pub surface_velocity: [f32; 3],
+    /// Largest rolling torque over normal force and radius.
+    pub rolling_resistance: f32,
+    /// The same about the normal.
+    pub twisting_resistance: f32,
+    /// Unused.
+    pub pad_a: u32,
+    /// Unused.
+    pub pad_b: u32,
+    /// Unused.
+    pub pad_c: u32,
 }
 
 /// Bounding box of a collider over the coming step. 32 bytes.

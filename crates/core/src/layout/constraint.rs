@@ -1,7 +1,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// What the points of one constraint share. 80 bytes. Constraints lie in batch order.
+/// What the points of one constraint share. 112 bytes. Constraints lie in batch order.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct ConstraintHead {
@@ -31,12 +31,23 @@ pub struct ConstraintHead {
     pub round_a: f32,
     /// The same of the second body's.
     pub round_b: f32,
-    /// Unused.
-    pub pad_a: u32,
+    /// Largest rolling torque over normal force, m; 0 where nothing resists.
+    pub rolling_resistance: f32,
     /// From the centre of mass of a to that of b when the points were found, world axes, m.
     pub between: [f32; 3],
+    /// Largest torque about the normal over normal force, m; 0 where nothing resists.
+    pub twisting_resistance: f32,
+    /// Angular impulse against twisting (about the normal) and rolling (about the two tangents); lasts from step to
+    /// step, N m s.
+    pub resisted: [f32; 3],
+    /// Inertia that rolling sees about its slightest axis, kg m²; 0 where nothing resists.
+    pub rolling_inertia: f32,
+    /// Velocity of b's surface against its body less that of a's, along the two tangents, m/s; held for the step.
+    pub surface_velocity: [f32; 2],
+    /// Inertia that twisting sees, kg m²; 0 where nothing resists.
+    pub twisting_inertia: f32,
     /// Unused.
-    pub pad_b: u32,
+    pub pad_a: u32,
 }
 
 /// One contact point as the solver sees it. 48 bytes.
@@ -81,12 +92,8 @@ pub struct Impulse {
 pub struct ManifoldMemory {
     /// Sum over the points of [`ConstraintHead::remembered`], N s. Means nothing where the slot has no contact.
     pub remembered: f32,
-    /// Unused.
-    pub pad_a: u32,
-    /// Unused.
-    pub pad_b: u32,
-    /// Unused.
-    pub pad_c: u32,
+    /// [`ConstraintHead::resisted`].
+    pub resisted: [f32; 3],
     /// [`ConstraintPoint::deviation`] of the points.
     pub deviations: [f32; 4],
     /// [`ConstraintPoint::total`] of the points in the last step.

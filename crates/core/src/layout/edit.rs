@@ -26,7 +26,7 @@ pub mod edit_op {
     pub const FREEZE: u32 = 10;
     /// Nothing changes; like all edits it wakes the body.
     pub const WAKE: u32 = 11;
-    /// A collider is written: data\[0..4\] its 64 bytes, `born` excepted, which is the step's number.
+    /// A collider is written: data\[0..6\] its 96 bytes, `born` excepted, which is the step's number.
     pub const COLLIDER: u32 = 12;
     /// The collider is gone: all zero but for the body that it was on.
     pub const COLLIDER_REMOVE: u32 = 13;

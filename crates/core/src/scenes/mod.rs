@@ -6,6 +6,7 @@
 
 mod crowds;
 mod heaps;
+mod materials;
 mod motion;
 mod random;
 mod stacks;
@@ -13,12 +14,13 @@ mod structures;
 
 pub use crowds::{Crowd, crowd};
 pub use heaps::{balls, balls_seeded, mixed, mixed_seeded, pile, pile_seeded};
+pub use materials::{ball_column, ball_on_slope, conveyor, rolling_ball, spinning};
 pub use motion::{bouncing_ball, bullet, closed_system, cradle, free_box, free_fall, ramp, sliding_box, slip_to_roll};
 pub use stacks::{
     column, hub, large_on_small, many_pyramids, mass_ratio, overlap_cube, pyramid, topped_pyramid, wide_pyramid,
 };
 
-pub use structures::{ball_column, card_house, dominoes, jenga, plank_tower, tiny_pyramid};
+pub use structures::{card_house, dominoes, jenga, plank_tower, tiny_pyramid};
 
 use crate::builder::{ColliderBuilder, RigidBodyBuilder};
 use crate::handle::BodyHandle;

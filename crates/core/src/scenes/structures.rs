@@ -1,6 +1,6 @@
 //! Structures that stand by friction and balance, and a row that falls as it should.
 
-use super::{DENSITY, FRICTION, add_floor, ball, cuboid, dynamic};
+use super::{DENSITY, FRICTION, add_floor, cuboid, dynamic};
 use crate::builder::RigidBodyBuilder;
 use crate::scene::Scene;
 use glam::{Quat, Vec3};
@@ -104,16 +104,6 @@ pub fn tiny_pyramid(base: usize) -> Scene {
             let at = Vec3::new(x, (2 * layer + 1) as f32 * half, 0.0);
             scene.insert(dynamic(at), cuboid(Vec3::splat(half)).density(DENSITY));
         }
-    }
-    scene
-}
-
-/// Balls of 0.5 m radius balanced one on the other.
-pub fn ball_column(balls: usize) -> Scene {
-    let mut scene = Scene::new();
-    add_floor(&mut scene, FRICTION, 0.0);
-    for i in 0..balls {
-        scene.insert(dynamic(Vec3::Y * (i as f32 + 0.5)), ball(0.5));
     }
     scene
 }

@@ -4,6 +4,7 @@
 //! `x86-64-v3`), else four. Lanes know nothing of each other, so the results are the same.
 
 use super::push_lanes;
+use super::resist::resists;
 use super::store::Solved;
 use crate::shared::Shared;
 use std::ops::{Add, Mul, Sub};
@@ -109,6 +110,14 @@ pub(crate) struct HeadLanes {
     pub(crate) remembered: Lane,
     pub(crate) round_a: Lane,
     pub(crate) round_b: Lane,
+    pub(crate) surface_velocity: [Lane; 2],
+    /// Whether any of them resists rolling or twisting; what follows is only looked at if so.
+    pub(crate) resists: bool,
+    pub(crate) rolling_resistance: Lane,
+    pub(crate) twisting_resistance: Lane,
+    pub(crate) rolling_inertia: Lane,
+    pub(crate) twisting_inertia: Lane,
+    pub(crate) resisted: [Lane; 3],
 }
 
 /// Constraints of one batch.
@@ -150,6 +159,16 @@ impl ConstraintLanes {
         set(&mut head.remembered, lane, from.remembered);
         set(&mut head.round_a, lane, from.round_a);
         set(&mut head.round_b, lane, from.round_b);
+        set(&mut head.surface_velocity[0], lane, from.surface_velocity[0]);
+        set(&mut head.surface_velocity[1], lane, from.surface_velocity[1]);
+        if resists(from) {
+            head.resists = true;
+            set(&mut head.rolling_resistance, lane, from.rolling_resistance);
+            set(&mut head.twisting_resistance, lane, from.twisting_resistance);
+            set(&mut head.rolling_inertia, lane, from.rolling_inertia);
+            set(&mut head.twisting_inertia, lane, from.twisting_inertia);
+            head.resisted.iter_mut().zip(from.resisted).for_each(|(to, from)| set(to, lane, from));
+        }
     }
 
     /// Puts a point with what its slot remembers into a lane; masses and the other arm follow for all lanes at once.
@@ -197,6 +216,7 @@ impl ConstraintLanes {
             impulses: std::array::from_fn(|k| (at(&points[k].normal), points[k].tangent.each_ref().map(at))),
             totals: std::array::from_fn(|k| points[k].total.each_ref().map(at)),
             remembered: at(&self.head.remembered),
+            resisted: self.head.resisted.each_ref().map(at),
             deviations: std::array::from_fn(|k| at(&points[k].deviation)),
         }
     }

@@ -1,6 +1,6 @@
 //! Stage `solver`: rows (`prepare`), the laws of a visit (`one_pass`, `soft`, `gauss_seidel`, `jacobi` and `penalty`, on
-//! `push`; several constraints at a time in those called `_lanes`), the passes over batches (`passes`; in plain form
-//! here), and the way back to the store (`store`). Twin of `shaders/solver/`.
+//! `push` and `resist`; several constraints at a time in those called `_lanes`), the passes over batches (`passes`; in plain
+//! form here), and the way back to the store (`store`). Twin of `shaders/solver/`.
 //!
 //! Contacts are found once a step and solved in sub-steps (Macklin et al., "Small Steps in Physics Simulation", SCA
 //! 2019), by one of these:
@@ -30,6 +30,8 @@ pub mod prepare;
 mod prepare_lanes;
 mod push;
 mod push_lanes;
+mod resist;
+mod resist_lanes;
 mod soft;
 mod soft_lanes;
 pub mod store;
@@ -122,6 +124,7 @@ impl Rows {
         start: &[u32],
         colliders: &[Collider],
         bodies: &[SolverBody],
+        states: &[BodyState],
         step: &StepParams,
         contact: impl Fn(usize) -> Contact<'c> + Sync,
     ) {
@@ -141,7 +144,11 @@ impl Rows {
             for lane in 0..count as usize {
                 let contact = contact(first as usize + lane);
                 let manifold = contact.manifold;
-                group.set_head(lane, &prepare::prepare_head(&contact, colliders, bodies, step), manifold.between);
+                group.set_head(
+                    lane,
+                    &prepare::prepare_head(&contact, colliders, bodies, states, step),
+                    manifold.between,
+                );
                 for point in 0..manifold.count as usize {
                     group.set_point(lane, point, &manifold.points[point], prepare::carry(&contact, point));
                 }
@@ -150,7 +157,8 @@ impl Rows {
         });
         let last = start[LAST_BATCH as usize] as usize..start[LAST_BATCH as usize + 1] as usize;
         self.last_first = last.start;
-        self.last = PlainRows::build(last, |c| prepare::prepare_constraint(&contact(c), colliders, bodies, step));
+        self.last =
+            PlainRows::build(last, |c| prepare::prepare_constraint(&contact(c), colliders, bodies, states, step));
     }
 
     /// Calls `take(c, solved)` for every constraint, from many threads at once.
@@ -191,6 +199,7 @@ impl PlainRows {
             impulses: std::array::from_fn(|k| (impulses[k].normal, impulses[k].tangent)),
             totals: std::array::from_fn(|k| points[k].total),
             remembered: self.heads[c].remembered,
+            resisted: self.heads[c].resisted,
             deviations: std::array::from_fn(|k| points[k].deviation),
         }
     }
@@ -206,7 +215,7 @@ impl PlainRows {
             match visit {
                 Visit::WarmStart => push::warm_start(head, tangents, points, impulses, &mut a, &mut b),
                 Visit::Solve | Visit::Relax => {
-                    soft::visit(visit, head, tangents, points, impulses, &mut a, &mut b, step);
+                    soft::visit(visit, head, tangents, points, impulses, [&mut a, &mut b], step);
                 }
                 Visit::Load => one_pass::load(head, tangents, points, impulses, &mut a, &mut b),
                 Visit::Pass => one_pass::pass(head, tangents, points, impulses, &mut a, &mut b, step),

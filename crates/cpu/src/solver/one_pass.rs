@@ -15,6 +15,7 @@
 //! every part of a pile gets the rate of its own neighbourhood, with no sum over islands.
 
 use super::push::{apply, arms, count, push_tangent, relative_velocity, separation, warm_start};
+use super::resist::resist;
 use crate::math::{finite, inverse_inertia_times, quat, rotate_back, vec3};
 use glam::Vec3;
 use tumble_core::layout::{BodyProps, BodyState, ConstraintHead, ConstraintPoint, Impulse, SolverBody, StepParams};
@@ -44,6 +45,8 @@ pub(super) fn load(
         let [x, y] = impulse.tangent;
         weight += over(impulse.normal * impulse.normal, point.normal_mass) + over(x * x + y * y, point.tangent_mass);
     }
+    let [twist, x, y] = head.resisted;
+    weight += over(twist * twist, head.twisting_inertia) + over(x * x + y * y, head.rolling_inertia);
     let [from_a, from_b] = eigenvalues(a, b);
     a.weight += weight;
     a.weighted += weight * from_b;
@@ -70,6 +73,7 @@ pub(super) fn pass(
         push_tangent(head, tangents, point, impulse, a, b);
         count(point, impulse);
     }
+    resist(head, tangents, impulses, a, b);
     remember(head, points, impulses, a, b, step);
     for (k, (point, impulse)) in points.iter().zip(impulses).enumerate() {
         // A blow is given once: the next sub-step starts without it.

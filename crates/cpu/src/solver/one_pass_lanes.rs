@@ -3,6 +3,7 @@
 use super::lanes::{BodyLanes, ConstraintLanes, HeadLanes, Lane, PointLanes, V3, Weights};
 use super::one_pass::{DEVIATION, FADE};
 use super::push_lanes::{apply, arms, count, push_tangent, separation, warm_start};
+use super::resist_lanes::resist;
 use tumble_core::layout::StepParams;
 
 /// Applies the stored impulses; what each body's weights grow by.
@@ -14,6 +15,10 @@ pub(super) fn load(c: &mut ConstraintLanes, a: &mut BodyLanes, b: &mut BodyLanes
     for p in points {
         let [x, y] = p.tangent;
         weight += over(p.normal * p.normal, p.normal_mass) + over(x * x + y * y, p.tangent_mass);
+    }
+    if head.resists {
+        let [twist, x, y] = head.resisted;
+        weight += over(twist * twist, head.twisting_inertia) + over(x * x + y * y, head.rolling_inertia);
     }
     let [from_a, from_b] = eigenvalues(a, b);
     [Weights { weight, weighted: weight * from_b }, Weights { weight, weighted: weight * from_a }]
@@ -38,6 +43,7 @@ pub(super) fn pass(
         push_tangent(head, p, a, b);
         count(p);
     }
+    resist(head, points, a, b);
     remember(head, points, a, b, step);
     let mut blows = [None; 4];
     for ((blown, (normal, tangent)), p) in blows.iter_mut().zip(before).zip(points) {

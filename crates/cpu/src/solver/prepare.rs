@@ -1,14 +1,15 @@
 //! Builds the step's solver bodies and constraint rows. Twin of `shaders/solver/prepare.wgsl`.
 
 use super::PlainConstraint;
+use super::resist::resists;
 use crate::bounds::moves;
 use crate::contact::NO_FEATURE;
-use crate::math::{inverse_inertia_times, quat, tangents, vec3};
+use crate::math::{inverse_inertia_times, quat, rotate, tangents, vec3};
 use bytemuck::Zeroable;
 use glam::{Mat3, Vec3};
 use tumble_core::layout::{
     BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Impulse, Manifold, ManifoldMemory, Pair,
-    SolverBody, StepParams, pair_kind, shape_kind,
+    SolverBody, StepParams, pair_kind, shape_kind, solver,
 };
 
 /// A body as the solver moves it; what nothing may push has no mass and keeps its velocity.
@@ -63,10 +64,11 @@ pub fn prepare_constraint(
     contact: &Contact<'_>,
     colliders: &[Collider],
     bodies: &[SolverBody],
+    states: &[BodyState],
     step: &StepParams,
 ) -> PlainConstraint {
     let manifold = contact.manifold;
-    let head = prepare_head(contact, colliders, bodies, step);
+    let head = prepare_head(contact, colliders, bodies, states, step);
     let (a, b) = (&bodies[head.body_a as usize], &bodies[head.body_b as usize]);
     let mut points = [ConstraintPoint::zeroed(); 4];
     let mut impulses = [Impulse { normal: 0.0, tangent: [0.0; 2], feature: NO_FEATURE }; 4];
@@ -101,6 +103,7 @@ pub(super) fn prepare_head(
     contact: &Contact<'_>,
     colliders: &[Collider],
     bodies: &[SolverBody],
+    states: &[BodyState],
     step: &StepParams,
 ) -> ConstraintHead {
     let (pair, manifold) = (contact.pair, contact.manifold);
@@ -111,7 +114,7 @@ pub(super) fn prepare_head(
     } else {
         (step.static_bias_rate, step.static_mass_scale, step.static_impulse_scale)
     };
-    ConstraintHead {
+    let mut head = ConstraintHead {
         normal: manifold.normal,
         friction: combined(ca.combine & 3, cb.combine & 3, ca.friction, cb.friction),
         body_a: ca.body,
@@ -125,10 +128,49 @@ pub(super) fn prepare_head(
         remembered: remembered(contact),
         round_a: round(ca, manifold),
         round_b: -round(cb, manifold),
-        pad_a: 0,
         between: manifold.between,
-        pad_b: 0,
+        ..ConstraintHead::zeroed()
+    };
+    head.rolling_resistance = ca.rolling_resistance.max(cb.rolling_resistance);
+    head.twisting_resistance = ca.twisting_resistance.max(cb.twisting_resistance);
+    if resists(&head) {
+        let lever = lever(ca, cb);
+        head.rolling_resistance *= lever;
+        head.twisting_resistance *= lever;
+        let (a, b) = (&bodies[ca.body as usize], &bodies[cb.body as usize]);
+        let normal = vec3(manifold.normal);
+        let (t1, t2) = tangents(normal);
+        let about = |u: Vec3, v: Vec3| v.dot(inverse_inertia_times(a, u) + inverse_inertia_times(b, u));
+        let (k11, k12, k22) = (about(t1, t1), about(t1, t2), about(t2, t2));
+        // As for friction: isotropic, and never too far.
+        let slightest = 0.5 * (k11 + k22) + (0.25 * (k11 - k22) * (k11 - k22) + k12 * k12).sqrt();
+        head.rolling_inertia = inverse(slightest);
+        head.twisting_inertia = inverse(about(normal, normal));
+        // Solvers that do not resist must not go on with what others left.
+        let none = is_fresh(contact) || step.solver > solver::SOFT;
+        head.resisted = if none { [0.0; 3] } else { contact.memory.resisted };
     }
+    if ca.surface_velocity != [0.0; 3] || cb.surface_velocity != [0.0; 3] {
+        let (t1, t2) = tangents(vec3(manifold.normal));
+        let of = |c: &Collider| rotate(quat(states[c.body as usize].rotation), vec3(c.surface_velocity));
+        let velocity = of(cb) - of(ca);
+        head.surface_velocity = [t1.dot(velocity), t2.dot(velocity)];
+    }
+    head
+}
+
+/// More than any, m.
+const NO_RADIUS: f32 = 1e30;
+
+/// The radius that resistance is a share of: that of the smaller ball; where there is none, the smallest half extent.
+fn lever(a: &Collider, b: &Collider) -> f32 {
+    let ball = a.shape == shape_kind::BALL || b.shape == shape_kind::BALL;
+    let of = |c: &Collider| match c.shape {
+        shape_kind::BALL => c.size[0],
+        shape_kind::CUBOID if !ball => c.size[0].min(c.size[1]).min(c.size[2]),
+        _ => NO_RADIUS,
+    };
+    of(a).min(of(b))
 }
 
 /// Part of an arm that does not turn with its body: from the centre of a ball to midway between the surfaces, m.
@@ -138,8 +180,12 @@ fn round(collider: &Collider, manifold: &Manifold) -> f32 {
 
 /// What the slot remembers, shared among the points; nothing where it had no contact.
 fn remembered(contact: &Contact<'_>) -> f32 {
-    let fresh = contact.pair.kind & pair_kind::FRESH != 0 || contact.stored[0].feature == NO_FEATURE;
-    if fresh { 0.0 } else { contact.memory.remembered / contact.manifold.count as f32 }
+    if is_fresh(contact) { 0.0 } else { contact.memory.remembered / contact.manifold.count as f32 }
+}
+
+/// Whether the slot had no contact of this pair before.
+fn is_fresh(contact: &Contact<'_>) -> bool {
+    contact.pair.kind & pair_kind::FRESH != 0 || contact.stored[0].feature == NO_FEATURE
 }
 
 /// What the slot remembers of a point whose feature stayed: its impulse, and what it bears more than the mean.

@@ -1,6 +1,7 @@
 //! What the laws of all solvers share: how a push changes two bodies, friction, bounces. Twin of
 //! `shaders/solver/push.wgsl`.
 
+use super::resist;
 use crate::math::{finite, inverse_inertia_times, quat, rotate, vec3};
 use glam::Vec3;
 use tumble_core::layout::{ConstraintHead, ConstraintPoint, Impulse, SolverBody, StepParams};
@@ -19,6 +20,7 @@ pub(super) fn warm_start(
         let [ra, rb] = arms(head, point);
         apply(a, b, ra, rb, push);
     }
+    resist::warm_start(head, [t1, t2], a, b);
 }
 
 /// From the bodies' centres of mass to a point.
@@ -48,8 +50,9 @@ pub(super) fn push_tangent(
 ) {
     let [ra, rb] = arms(head, point);
     let slide = relative_velocity(a, b, ra, rb);
-    let mut x = impulse.tangent[0] - point.tangent_mass * t1.dot(slide);
-    let mut y = impulse.tangent[1] - point.tangent_mass * t2.dot(slide);
+    let [u, v] = head.surface_velocity;
+    let mut x = impulse.tangent[0] - point.tangent_mass * (t1.dot(slide) + u);
+    let mut y = impulse.tangent[1] - point.tangent_mass * (t2.dot(slide) + v);
     let length = (x * x + y * y).sqrt();
     let most = head.friction * impulse.normal;
     if length > most {

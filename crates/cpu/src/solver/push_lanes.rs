@@ -1,6 +1,7 @@
 //! What the laws of `push` do, several constraints at a time: the same operations in the same order, so the same results.
 
 use super::lanes::{BodyLanes, HeadLanes, Lane, PointLanes, V3};
+use super::resist_lanes;
 use tumble_core::layout::StepParams;
 
 #[inline(always)]
@@ -11,6 +12,7 @@ pub(super) fn warm_start(head: &HeadLanes, points: &[PointLanes], a: &mut BodyLa
         let [ra, rb] = arms(head, p);
         apply(a, b, ra, rb, push);
     }
+    resist_lanes::warm_start(head, a, b);
 }
 
 /// From the bodies' centres of mass to one point of each.
@@ -40,8 +42,9 @@ pub(super) fn separation(head: &HeadLanes, p: &PointLanes, a: &BodyLanes, b: &Bo
 pub(super) fn push_tangent(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLanes, b: &mut BodyLanes) {
     let ([t1, t2], [ra, rb]) = (head.tangents, arms(head, p));
     let slide = b.velocity_at(rb) - a.velocity_at(ra);
-    let x = p.tangent[0] - p.tangent_mass * t1.dot(slide);
-    let y = p.tangent[1] - p.tangent_mass * t2.dot(slide);
+    let [u, v] = head.surface_velocity;
+    let x = p.tangent[0] - p.tangent_mass * (t1.dot(slide) + u);
+    let y = p.tangent[1] - p.tangent_mass * (t2.dot(slide) + v);
     let length = (x * x + y * y).sqrt();
     let most = head.friction * p.normal;
     let scale = length.simd_gt(most).bitselect(most / length, Lane::ONE);

@@ -3,6 +3,7 @@
 
 use super::Visit;
 use super::push::{apply, arms, count, push_tangent, relative_velocity, separation};
+use super::resist::resist;
 use crate::math::{finite, vec3};
 use glam::Vec3;
 use tumble_core::layout::{ConstraintHead, ConstraintPoint, Impulse, SolverBody, StepParams};
@@ -10,23 +11,23 @@ use tumble_core::layout::{ConstraintHead, ConstraintPoint, Impulse, SolverBody, 
 /// One visit to one constraint: normals first, then friction within the cone that they allow.
 pub(super) fn visit(
     visit: Visit,
-    head: &ConstraintHead,
+    head: &mut ConstraintHead,
     tangents: [Vec3; 2],
     points: &mut [ConstraintPoint],
     impulses: &mut [Impulse],
-    a: &mut SolverBody,
-    b: &mut SolverBody,
+    [a, b]: [&mut SolverBody; 2],
     step: &StepParams,
 ) {
     for (point, impulse) in points.iter_mut().zip(impulses.iter_mut()) {
         push_normal(visit, head, point, impulse, a, b, step);
     }
-    for (point, impulse) in points.iter_mut().zip(impulses) {
+    for (point, impulse) in points.iter_mut().zip(impulses.iter_mut()) {
         push_tangent(head, tangents, point, impulse, a, b);
         if visit == Visit::Relax {
             count(point, impulse);
         }
     }
+    resist(head, tangents, impulses, a, b);
 }
 
 /// A gap is closed no faster than it lasts; overlap is a damped spring when soft, and left alone when rigid.

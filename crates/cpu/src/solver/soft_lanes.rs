@@ -3,6 +3,7 @@
 use super::Visit;
 use super::lanes::{BodyLanes, ConstraintLanes, HeadLanes, Lane, PointLanes};
 use super::push_lanes::{apply, arms, count, push_tangent, separation};
+use super::resist_lanes::resist;
 use tumble_core::layout::StepParams;
 
 /// One visit to the constraints of a group.
@@ -12,12 +13,13 @@ pub(super) fn visit(visit: Visit, c: &mut ConstraintLanes, a: &mut BodyLanes, b:
     for p in points.iter_mut() {
         push_normal(visit, head, p, a, b, step);
     }
-    for p in points {
+    for p in points.iter_mut() {
         push_tangent(head, p, a, b);
         if visit == Visit::Relax {
             count(p);
         }
     }
+    resist(head, points, a, b);
 }
 
 #[inline(always)]

@@ -12,6 +12,8 @@ pub struct Solved {
     pub totals: [[f32; 3]; 4],
     /// What the points bear in the long run, on the mean.
     pub remembered: f32,
+    /// Angular impulse against twisting and rolling.
+    pub resisted: [f32; 3],
     /// What each point bears more.
     pub deviations: [f32; 4],
 }
@@ -31,8 +33,8 @@ pub fn store_memory(manifold: &Manifold, solved: &Solved) -> ManifoldMemory {
     let used = |point: usize| point < manifold.count as usize;
     ManifoldMemory {
         remembered: solved.remembered * manifold.count as f32,
+        resisted: solved.resisted,
         deviations: std::array::from_fn(|point| if used(point) { solved.deviations[point] } else { 0.0 }),
         totals: std::array::from_fn(|point| if used(point) { solved.totals[point] } else { [0.0; 3] }),
-        ..ManifoldMemory::default()
     }
 }

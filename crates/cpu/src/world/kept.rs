@@ -227,7 +227,7 @@ impl Kept {
             .with_min_len(256)
             .map(|i| prepare::prepare_body(&states[i], &self.props[i], batches.masks[i]))
             .collect();
-        self.rows.build(&batches.start, &self.colliders, &bodies, step, |c| {
+        self.rows.build(&batches.start, &self.colliders, &bodies, &states, step, |c| {
             let index = batches.order[c] as usize;
             let pair = &matched.pairs[index];
             let stored = &self.impulses[4 * pair.slot as usize..][..4];
