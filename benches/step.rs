@@ -54,9 +54,14 @@ impl Row {
     }
 }
 
+/// rapier's default.
+const RAPIER_SUBSTEPS: u32 = 4;
+
+/// Each engine with its own default number of sub-steps.
 fn compare(name: &str, scene: &Scene, settings: &Settings, gpu: bool) -> Vec<Row> {
     let params = Params { threads: Some(settings.threads), ..Params::default() };
-    let mut theirs = RapierWorld::new(scene, &params, settings.threads);
+    let usual = Params { substeps: RAPIER_SUBSTEPS, ..params };
+    let mut theirs = RapierWorld::new(scene, &usual, settings.threads);
     let mut ours = tumble::cpu::World::new(scene.clone(), params).expect("the scene is valid");
     let mut ours_gpu = gpu.then(|| World::new(scene.clone(), params, Backend::Gpu).expect("an adapter"));
     for _ in 0..settings.warm_up {
@@ -140,12 +145,18 @@ fn main() {
     } else {
         Settings { warm_up: 120, rounds: 12, steps_a_round: 10, threads }
     };
-    println!("{threads} threads, dt 1/60 s, 4 sub-steps, {} warm-up steps", settings.warm_up);
+    let ours = Params::default().substeps;
+    println!(
+        "{threads} threads, dt 1/60 s, sub-steps: rapier {RAPIER_SUBSTEPS}, tumble {ours}; {} warm-up steps",
+        settings.warm_up
+    );
     let gpu = !has("--no-gpu");
     let (base, count) = if quick { (10, 64) } else { (100, 4096) };
     let mut rows = compare("pyramid", &scenes::pyramid(base), &settings, gpu);
     rows.extend(compare("pile", &scenes::pile(count), &settings, gpu));
     rows.extend(compare("balls", &scenes::balls(count), &settings, gpu));
+    let walls = if quick { 2 } else { 196 };
+    rows.extend(compare("many_pyramids", &scenes::many_pyramids(walls, 10), &settings, gpu));
     if let Some(at) = arguments.iter().position(|a| a == "--out") {
         let folder = arguments.get(at + 1).expect("--out wants a folder");
         std::fs::create_dir_all(folder).expect("the folder can be made");
