@@ -78,7 +78,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         Rest { position, time, rotation, island, pad_a, pad_b, pad_c }
         SolverBody {
             linear_velocity, inverse_mass, angular_velocity, touched, translation, eigenvalue, delta,
-            inverse_inertia_diagonal, level, inverse_inertia_off, pad_c, linear_start, weight, angular_start, weighted
+            inverse_inertia_diagonal, level, inverse_inertia_off, parts, linear_start, weight, angular_start, weighted
         }
         PoseRecord { translation, tag, rotation }
         Collider { size, shape, position, body, rotation, friction, restitution, combine, born, surface_velocity,
@@ -153,7 +153,7 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
         }
         query_word as "QUERY_" { UNBOUNDED, TURNS, TOTAL, COUNT }
         tree_members as "MEMBERS_" { MOVING, FIXED, LARGE, ALL }
-        batching as "BATCHING_" { WRITE_AND_VERIFY, LOWEST_FREE, PERSISTENT, LAW, STATIC_LAST }
+        batching as "BATCHING_" { WRITE_AND_VERIFY, LOWEST_FREE, PERSISTENT, LAW, STATIC_LAST, SPLIT_LAST }
         ;
         BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT, NO_NODE, NO_COLLIDER,
         LEVELS, LEVEL_HOLD, LEVEL_CALM, MOST_CREDIT

@@ -59,7 +59,7 @@ struct SolverBody {
     inverse_inertia_diagonal: vec3<f32>,
     level: u32,
     inverse_inertia_off: vec3<f32>,
-    pad_c: u32,
+    parts: u32,
     linear_start: vec3<f32>,
     weight: f32,
     angular_start: vec3<f32>,

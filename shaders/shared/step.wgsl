@@ -6,6 +6,7 @@ const BATCHING_LOWEST_FREE: u32 = 2u;
 const BATCHING_PERSISTENT: u32 = 3u;
 const BATCHING_LAW: u32 = 3u;
 const BATCHING_STATIC_LAST: u32 = 4u;
+const BATCHING_SPLIT_LAST: u32 = 8u;
 
 const SOLVER_ONE_PASS: u32 = 0u;
 const SOLVER_SOFT: u32 = 1u;

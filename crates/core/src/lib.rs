@@ -39,7 +39,7 @@ pub use error::{Error, Result};
 pub use handle::{BodyHandle, ColliderHandle, Inserted};
 pub use mass::MassProperties;
 pub use packed::PackedScene;
-pub use params::{Batching, Broadphase, Capacities, MortonBits, Params, Sleep, Traversal};
+pub use params::{Batching, Broadphase, Capacities, LastBatch, MortonBits, Params, Sleep, Traversal};
 pub use plan::Plan;
 pub use poses::{Pose, Poses, Velocities, Velocity};
 pub use query::{Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Ray, RayHit};

@@ -22,6 +22,8 @@ pub struct Plan {
     pub sleep: bool,
     /// Islands have sub-steps of their own.
     pub levels: bool,
+    /// The last batch is solved by mass splitting.
+    pub split: bool,
 }
 
 impl Plan {
@@ -48,7 +50,7 @@ impl Plan {
         allow(balls > 0 && halfspaces > 0, pair_kind::BALL_HALFSPACE);
         allow(cuboids > 0 && halfspaces > 0, pair_kind::CUBOID_HALFSPACE);
         let fixed = if fixed > 0 { fixed.next_power_of_two() } else { 0 };
-        Self { pair_kinds, restitution, fixed, sleep: false, levels: false }
+        Self { pair_kinds, restitution, fixed, sleep: false, levels: false, split: false }
     }
 
     /// Adds what `other` needs; true when that was anything new.
@@ -59,13 +61,15 @@ impl Plan {
         self.fixed = self.fixed.max(other.fixed);
         self.sleep |= other.sleep;
         self.levels |= other.levels;
+        self.split |= other.split;
         *self != before
     }
 
     /// The plan with what these parameters need.
     pub fn with(self, params: &Params) -> Self {
         let levels = self.levels || params.accuracy.is_by_island();
-        Self { sleep: self.sleep || params.sleep.is_some(), levels, ..self }
+        let split = self.split || params.splits_last();
+        Self { sleep: self.sleep || params.sleep.is_some(), levels, split, ..self }
     }
 
     /// Whether something asks which bodies hang together by contacts.

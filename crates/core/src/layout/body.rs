@@ -126,8 +126,8 @@ pub struct SolverBody {
     pub level: u32,
     /// xy, xz, yz of the same.
     pub inverse_inertia_off: [f32; 3],
-    /// Unused.
-    pub pad_c: u32,
+    /// Mass splitting: its constraints in the last batch, and so the parts that it is split into there; else 0.
+    pub parts: u32,
     /// One pass: the velocity with which the sub-step began, before impulses, m/s. What the velocity has more, carries
     /// over. Jacobi and penalty: the velocity with which the iteration ends, a sum.
     pub linear_start: [f32; 3],

@@ -114,4 +114,6 @@ pub mod batching {
     pub const LAW: u32 = 3;
     /// Flag: contacts with what does not move take the highest free batch, not the lowest.
     pub const STATIC_LAST: u32 = 4;
+    /// Flag: the last batch is solved by mass splitting, not in sequence.
+    pub const SPLIT_LAST: u32 = 8;
 }

@@ -1,6 +1,7 @@
 //! Stage `solver`: rows (`prepare`), the laws of a visit (`one_pass`, `soft`, `gauss_seidel`, `jacobi` and `penalty`, on
 //! `push` and `resist`; several constraints at a time in those called `_lanes`), the passes over batches (`passes`; in plain
-//! form here), and the way back to the store (`store`). Twin of `shaders/solver/`.
+//! form here; the last batch on parts of bodies by `split`), and the way back to the store (`store`). Twin of
+//! `shaders/solver/`.
 //!
 //! Contacts are found once a step and solved in sub-steps (Macklin et al., "Small Steps in Physics Simulation", SCA
 //! 2019), by one of these:
@@ -34,6 +35,7 @@ mod resist;
 mod resist_lanes;
 mod soft;
 mod soft_lanes;
+pub mod split;
 pub mod store;
 
 use crate::bounds::moves;
@@ -42,10 +44,11 @@ use crate::motion;
 use lanes::{ConstraintLanes, LANES};
 use prepare::Contact;
 use rayon::prelude::*;
+use split::Parts;
 use store::Solved;
 use tumble_core::layout::{
     BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Impulse, LAST_BATCH, SolverBody, StepParams,
-    solver,
+    batching, solver,
 };
 use wide::f32x4;
 
@@ -73,6 +76,8 @@ pub struct PlainRows {
     pub points: Vec<ConstraintPoint>,
     /// Four a constraint.
     pub impulses: Vec<Impulse>,
+    /// Those at the end that are solved by mass splitting.
+    parts: Parts,
 }
 
 /// One constraint in plain form.
@@ -158,8 +163,13 @@ impl Rows {
         });
         let last = start[LAST_BATCH as usize] as usize..start[LAST_BATCH as usize + 1] as usize;
         self.last_first = last.start;
+        let split = step.batching & batching::SPLIT_LAST != 0;
+        let (count, contact) = (last.len(), |c| Contact { split, ..contact(c) });
         self.last =
             PlainRows::build(last, |c| prepare::prepare_constraint(&contact(c), colliders, bodies, states, step));
+        if split {
+            self.last.split_last(count, bodies);
+        }
     }
 
     /// Calls `take(c, solved)` for every constraint, from many threads at once.
@@ -205,39 +215,62 @@ impl PlainRows {
         }
     }
 
+    /// Has the last `count` constraints solved by mass splitting. Their masses must be those that parts of the bodies see.
+    pub fn split_last(&mut self, count: usize, bodies: &[SolverBody]) {
+        self.parts = Parts::of(&self.heads[self.heads.len() - count..], bodies);
+    }
+
     /// One visit to every constraint, in order. Within a batch the order is of no account.
     pub fn sweep(&mut self, bodies: &mut [SolverBody], step: &StepParams, visit: Visit) {
-        let points = self.points.chunks_exact_mut(4);
-        for (head, (points, impulses)) in self.heads.iter_mut().zip(points.zip(self.impulses.chunks_exact_mut(4))) {
-            let (ia, ib, count) = (head.body_a as usize, head.body_b as usize, head.count as usize);
+        let (count, split) = (self.heads.len(), self.parts.count());
+        for c in 0..count - split {
+            let [ia, ib] = self.bodies_of(c);
             let (mut a, mut b) = (bodies[ia], bodies[ib]);
-            let (points, impulses) = (&mut points[..count], &mut impulses[..count]);
-            let tangents = tangents(head.normal.into()).into();
-            match visit {
-                Visit::WarmStart => push::warm_start(head, tangents, points, impulses, &mut a, &mut b),
-                Visit::Solve | Visit::Relax => {
-                    soft::visit(visit, head, tangents, points, impulses, [&mut a, &mut b], step);
-                }
-                Visit::Load => one_pass::load(head, tangents, points, impulses, &mut a, &mut b),
-                Visit::Pass => one_pass::pass(head, tangents, points, impulses, &mut a, &mut b, step),
-                Visit::GaussSeidel | Visit::LastGaussSeidel => {
-                    let last = visit == Visit::LastGaussSeidel;
-                    gauss_seidel::visit(last, head, tangents, points, impulses, [&mut a, &mut b], step);
-                }
-                Visit::Split => jacobi::split(&mut a, &mut b),
-                Visit::Jacobi | Visit::LastJacobi => {
-                    let last = visit == Visit::LastJacobi;
-                    jacobi::visit(last, head, tangents, points, impulses, [&mut a, &mut b], step);
-                }
-                Visit::Penalty => penalty::visit(head, tangents, points, impulses, &mut a, &mut b),
-                Visit::Restitution => push::restitution(head, points, impulses, &mut a, &mut b, step),
-            }
+            self.visit(c, &mut a, &mut b, step, visit);
             if a.inverse_mass > 0.0 {
                 bodies[ia] = a;
             }
             if b.inverse_mass > 0.0 {
                 bodies[ib] = b;
             }
+        }
+        let mut parts = std::mem::take(&mut self.parts);
+        for c in count - split..count {
+            let before = self.bodies_of(c).map(|body| split::part(&bodies[body]));
+            let [mut a, mut b] = before;
+            self.visit(c, &mut a, &mut b, step, visit);
+            parts.add(c + split - count, &before, &[a, b]);
+        }
+        parts.join(bodies);
+        self.parts = parts;
+    }
+
+    fn bodies_of(&self, c: usize) -> [usize; 2] {
+        [self.heads[c].body_a as usize, self.heads[c].body_b as usize]
+    }
+
+    /// One visit to constraint c.
+    fn visit(&mut self, c: usize, a: &mut SolverBody, b: &mut SolverBody, step: &StepParams, visit: Visit) {
+        let head = &mut self.heads[c];
+        let count = head.count as usize;
+        let (points, impulses) = (&mut self.points[4 * c..][..count], &mut self.impulses[4 * c..][..count]);
+        let tangents = tangents(head.normal.into()).into();
+        match visit {
+            Visit::WarmStart => push::warm_start(head, tangents, points, impulses, a, b),
+            Visit::Solve | Visit::Relax => soft::visit(visit, head, tangents, points, impulses, [a, b], step),
+            Visit::Load => one_pass::load(head, tangents, points, impulses, a, b),
+            Visit::Pass => one_pass::pass(head, tangents, points, impulses, a, b, step),
+            Visit::GaussSeidel | Visit::LastGaussSeidel => {
+                let last = visit == Visit::LastGaussSeidel;
+                gauss_seidel::visit(last, head, tangents, points, impulses, [a, b], step);
+            }
+            Visit::Split => jacobi::split(a, b),
+            Visit::Jacobi | Visit::LastJacobi => {
+                let last = visit == Visit::LastJacobi;
+                jacobi::visit(last, head, tangents, points, impulses, [a, b], step);
+            }
+            Visit::Penalty => penalty::visit(head, tangents, points, impulses, a, b),
+            Visit::Restitution => push::restitution(head, points, impulses, a, b, step),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::PlainConstraint;
 use super::resist::resists;
+use super::split;
 use crate::bounds::moves;
 use crate::contact::NO_FEATURE;
 use crate::math::{inverse_inertia_times, quat, rotate, tangents, vec3};
@@ -25,7 +26,7 @@ pub fn prepare_body(state: &BodyState, props: &BodyProps, mask: u64, step: &Step
         inverse_inertia_diagonal: [0.0; 3],
         level: step.level_of(state.credit),
         inverse_inertia_off: [0.0; 3],
-        pad_c: 0,
+        parts: 0,
         linear_start: [0.0; 3],
         weight: 0.0,
         angular_start: [0.0; 3],
@@ -59,6 +60,18 @@ pub struct Contact<'a> {
     pub memory: &'a ManifoldMemory,
     /// What the impulses are scaled by, see [`scale`].
     pub scale: f32,
+    /// Whether it works on parts of its bodies, see [`split`](super::split).
+    pub split: bool,
+}
+
+impl Contact<'_> {
+    /// What it works on: these bodies, or its parts of them.
+    fn bodies(&self, slots: [u32; 2], bodies: &[SolverBody]) -> [SolverBody; 2] {
+        slots.map(|slot| {
+            let body = &bodies[slot as usize];
+            if self.split { split::part(body) } else { *body }
+        })
+    }
 }
 
 /// The level of sub-steps of a constraint: bodies of one island have the same.
@@ -82,7 +95,7 @@ pub fn prepare_constraint(
 ) -> PlainConstraint {
     let manifold = contact.manifold;
     let head = prepare_head(contact, colliders, bodies, states, step);
-    let (a, b) = (&bodies[head.body_a as usize], &bodies[head.body_b as usize]);
+    let [a, b] = &contact.bodies([head.body_a, head.body_b], bodies);
     let mut points = [ConstraintPoint::zeroed(); 4];
     let mut impulses = [Impulse { normal: 0.0, tangent: [0.0; 2], feature: NO_FEATURE }; 4];
     let normal = vec3(manifold.normal);
@@ -151,7 +164,7 @@ pub(super) fn prepare_head(
         let lever = lever(ca, cb);
         head.rolling_resistance *= lever;
         head.twisting_resistance *= lever;
-        let (a, b) = (&bodies[ca.body as usize], &bodies[cb.body as usize]);
+        let [a, b] = &contact.bodies([ca.body, cb.body], bodies);
         let normal = vec3(manifold.normal);
         let (t1, t2) = tangents(normal);
         let about = |u: Vec3, v: Vec3| v.dot(inverse_inertia_times(a, u) + inverse_inertia_times(b, u));

@@ -5,15 +5,15 @@ use crate::batch::{self, Batches, Ends, Ordered};
 use crate::broadphase::{self, Boxes, Finder, Search, TooMany};
 use crate::contact::{self, Matched};
 use crate::shared::Shared;
-use crate::solver::{self, Rows, prepare, store};
+use crate::solver::{self, Rows, prepare, split, store};
 use crate::{bounds, continuous, edit, level, motion, narrowphase, sleep};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{
-    Aabb, BodyProps, BodyState, Collider, Control, FoundManifold, Impulse, Manifold, ManifoldMemory, Pair, PoseRecord,
-    QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, body_flags,
+    Aabb, BodyProps, BodyState, Collider, Control, FoundManifold, Impulse, LAST_BATCH, Manifold, ManifoldMemory, Pair,
+    PoseRecord, QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, batching, body_flags,
 };
 use tumble_core::stopwatch::Stopwatch;
 use tumble_core::{Broadphase, Error, Params, Result, limits};
@@ -230,6 +230,11 @@ impl Kept {
             .with_min_len(256)
             .map(|i| prepare::prepare_body(&states[i], &self.props[i], batches.masks[i], step))
             .collect();
+        if step.batching & batching::SPLIT_LAST != 0 {
+            let last = &batches.order[batches.start[LAST_BATCH as usize] as usize..];
+            let ends = last.iter().map(|&pair| bodies_of(&matched.pairs[pair as usize], &self.colliders));
+            split::count_parts(&mut bodies, ends);
+        }
         let mut run = run;
         for step in step.by_level() {
             let own = self.of_level(&batches, &matched, &bodies, &step);
@@ -241,7 +246,7 @@ impl Kept {
                 let stored = &self.impulses[4 * pair.slot as usize..][..4];
                 let memory = &self.memory[pair.slot as usize];
                 let scale = prepare::scale(a, b, step.h);
-                prepare::Contact { pair, manifold: &manifolds[index], stored, memory, scale }
+                prepare::Contact { pair, manifold: &manifolds[index], stored, memory, scale, split: false }
             });
             run = watch.next(run, "solver");
             let moving = solver::Bodies { solver: &mut bodies, states: &states, props: &self.props };
