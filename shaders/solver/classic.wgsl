@@ -11,17 +11,8 @@
 //   begin      one thread a body: the sums start with the velocities
 //   settle     the same: the sums become the velocities
 
-//#import solver/jacobi.wgsl
+//#import solver/iterate.wgsl
 //#import solver/penalty.wgsl
-//#import solver/sweep.wgsl
-
-// What a visit does.
-const GAUSS_SEIDEL: u32 = 0u;
-const LAST_GAUSS_SEIDEL: u32 = 1u;
-const SPLIT: u32 = 2u;
-const JACOBI: u32 = 3u;
-const LAST_JACOBI: u32 = 4u;
-const PENALTY: u32 = 5u;
 
 // Counts constraint c at its bodies.
 fn split_for(c: u32) {
@@ -35,8 +26,7 @@ fn split_for(c: u32) {
     }
 }
 
-// One iteration of constraint c: normals first, then friction within the cone that they allow. Jacobi pushes its parts
-// of the bodies and adds what they changed to the sums.
+// One iteration of constraint c. Jacobi pushes its parts of the bodies and adds what they changed to the sums.
 fn iterate(kind: u32, c: u32) {
     let head = heads[c];
     let split = kind == JACOBI || kind == LAST_JACOBI;
@@ -44,52 +34,11 @@ fn iterate(kind: u32, c: u32) {
     var b = solver_bodies[head.body_b];
     var after_a = a;
     var after_b = b;
-    var parts = 1.0;
     if split {
         after_a = part_of(a);
         after_b = part_of(b);
-        parts = max(a.weight, b.weight);
     }
-    let t = tangents(head.normal);
-    let first = 4u * c;
-    let end = first + min(head.count, 4u);
-    var p = first;
-    loop {
-        var point = points[p];
-        var impulse = impulses[p];
-        let lowest = point.approach;
-        var mass = point.normal_mass;
-        if split {
-            let r = arms(head, &point);
-            mass *= (yield_of(&a, r[0], head.normal) + yield_of(&b, r[1], head.normal))
-                / (yield_of(&after_a, r[0], head.normal) + yield_of(&after_b, r[1], head.normal));
-        }
-        iterate_normal(head, &point, &impulse, mass, &after_a, &after_b, step);
-        impulses[p].normal = impulse.normal;
-        if point.approach < lowest {
-            points[p].approach = point.approach;
-        }
-        continuing {
-            p++;
-            break if p >= end;
-        }
-    }
-    p = first;
-    loop {
-        var point = points[p];
-        var impulse = impulses[p];
-        // No more than the mass that is split so; friction against what has many contacts is slow.
-        point.tangent_mass /= parts;
-        push_tangent(head, t, &point, &impulse, &after_a, &after_b);
-        impulses[p].tangent = impulse.tangent;
-        if kind == LAST_GAUSS_SEIDEL || kind == LAST_JACOBI {
-            points[p].total = count(&point, &impulse);
-        }
-        continuing {
-            p++;
-            break if p >= end;
-        }
-    }
+    iterate_points(kind, c, head, &a, &b, &after_a, &after_b);
     if split {
         write_sums(head, &a, &b, &after_a, &after_b, vec2<f32>(a.weight, b.weight));
         return;
@@ -185,6 +134,9 @@ fn tail(kind: u32, lid: u32) {
             }
         }
         storageBarrier();
+    }
+    if splits_last() {
+        return;
     }
     let first = start_of(LAST_BATCH);
     let end = start_of(BATCHES);

@@ -1,5 +1,5 @@
 // What sweeps over constraints share: their buffers, and which constraint an invocation has. No pass; imported by
-// `solver/passes` and `solver/classic`.
+// `solver/passes`, `solver/classic` and `solver/split`.
 
 //#import shared/body.wgsl
 //#import shared/constraint.wgsl
@@ -50,4 +50,9 @@ fn constraint_of(wg: vec3<u32>, num: vec3<u32>, lid: u32) -> u32 {
 // Whether constraint c is one of those that this sweep is for.
 fn is_of_level(c: u32) -> bool {
     return heads[c].level == step.level;
+}
+
+// Whether the last batch has a pass of its own.
+fn splits_last() -> bool {
+    return (step.batching & BATCHING_SPLIT_LAST) != 0u;
 }

@@ -63,16 +63,20 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("sleep", include_str!("../sleep.wgsl")),
     ("solver/classic", include_str!("../solver/classic.wgsl")),
     ("solver/gauss_seidel", include_str!("../solver/gauss_seidel.wgsl")),
+    ("solver/iterate", include_str!("../solver/iterate.wgsl")),
     ("solver/jacobi", include_str!("../solver/jacobi.wgsl")),
     ("solver/one_pass", include_str!("../solver/one_pass.wgsl")),
+    ("solver/parts", include_str!("../solver/parts.wgsl")),
     ("solver/passes", include_str!("../solver/passes.wgsl")),
     ("solver/penalty", include_str!("../solver/penalty.wgsl")),
     ("solver/prepare", include_str!("../solver/prepare.wgsl")),
     ("solver/push", include_str!("../solver/push.wgsl")),
     ("solver/resist", include_str!("../solver/resist.wgsl")),
     ("solver/soft", include_str!("../solver/soft.wgsl")),
+    ("solver/split", include_str!("../solver/split.wgsl")),
     ("solver/store", include_str!("../solver/store.wgsl")),
     ("solver/sweep", include_str!("../solver/sweep.wgsl")),
+    ("solver/visit", include_str!("../solver/visit.wgsl")),
 ];
 
 const IMPORT: &str = "//#import ";

@@ -22,6 +22,7 @@ pub mod readback;
 pub mod recorder;
 mod sleep;
 mod solver;
+mod split;
 mod stages;
 mod store;
 mod timer;

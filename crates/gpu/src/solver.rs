@@ -1,20 +1,25 @@
 //! Stage `solver`: rows, sub-steps, and the way back. Host side of `shaders/solver/`.
 
-use crate::store::{args, index_part, level_part};
+use crate::split::Split;
+use crate::store::{Sizes, args, index_part, level_part};
 use crate::{Buffers, Gpu, Pass, Pipelines, Recorder};
 use std::sync::Arc;
-use tumble_core::layout::{StepParams, solver};
+use tumble_core::layout::{StepParams, batching, solver};
 use tumble_core::{Plan, Result};
 
 /// Sweeps of one pass and soft, and those that others share.
 const PASSES: &str = "solver/passes";
 /// Sweeps of the solvers that are there for comparison.
 const CLASSIC: &str = "solver/classic";
+/// Sweeps over the last batch by mass splitting.
+const SPLIT: &str = "solver/split";
 
 /// A sweep over all batches: one dispatch for each wide one, one for the rest.
 struct Sweep {
     batch: Arc<Pass>,
     tail: Arc<Pass>,
+    /// The last batch by mass splitting.
+    split: Option<Arc<Pass>>,
 }
 
 /// A pass over all bodies.
@@ -47,6 +52,8 @@ struct Start {
 
 pub(crate) struct Solver {
     bodies: Arc<Pass>,
+    /// Where the last batch may be solved by mass splitting.
+    split: Option<Split>,
     constraints: Arc<Pass>,
     carry: Arc<Pass>,
     /// Where islands have levels of sub-steps.
@@ -61,7 +68,14 @@ impl Sweep {
         Ok(Self {
             batch: pipelines.pass(gpu, stem, visit)?,
             tail: pipelines.pass(gpu, stem, &format!("{visit}_tail"))?,
+            split: None,
         })
+    }
+
+    /// One whose last batch may be solved by mass splitting.
+    fn splitting(gpu: &Gpu, pipelines: &mut Pipelines, plan: &Plan, stem: &str, visit: &str) -> Result<Self> {
+        let pass = plan.split.then(|| pipelines.pass(gpu, SPLIT, &format!("{visit}_split"))).transpose()?;
+        Ok(Self { split: pass, ..Self::new(gpu, pipelines, stem, visit)? })
     }
 
     fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
@@ -71,14 +85,18 @@ impl Sweep {
             let batch = [index_part("batch", buffers, index)?, level.clone()];
             recorder.dispatch_indirect(&self.batch, &batch, own, args::batch(index))?;
         }
-        recorder.dispatch_indirect(&self.tail, &[level], own, args::TAIL)
+        recorder.dispatch_indirect(&self.tail, std::slice::from_ref(&level), own, args::TAIL)?;
+        match self.split.as_ref().filter(|_| splits_last(step)) {
+            Some(split) => recorder.dispatch_indirect(split, &[level], own, args::TAIL),
+            None => Ok(()),
+        }
     }
 }
 
 impl Start {
-    fn new(gpu: &Gpu, pipelines: &mut Pipelines) -> Result<Self> {
+    fn new(gpu: &Gpu, pipelines: &mut Pipelines, plan: &Plan) -> Result<Self> {
         let velocities = ByBody::new(gpu, pipelines, "motion", "integrate_velocities")?;
-        Ok(Self { velocities, warm_start: Sweep::new(gpu, pipelines, PASSES, "warm_start")? })
+        Ok(Self { velocities, warm_start: Sweep::splitting(gpu, pipelines, plan, PASSES, "warm_start")? })
     }
 
     fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
@@ -88,29 +106,29 @@ impl Start {
 }
 
 impl Law {
-    fn new(gpu: &Gpu, pipelines: &mut Pipelines, law: u32) -> Result<Self> {
-        let mut sweep = |stem, visit| Sweep::new(gpu, pipelines, stem, visit);
+    fn new(gpu: &Gpu, pipelines: &mut Pipelines, plan: &Plan, law: u32) -> Result<Self> {
+        let mut sweep = |stem, visit| Sweep::splitting(gpu, pipelines, plan, stem, visit);
         Ok(match law {
             solver::SOFT => {
                 let (solve, relax) = (sweep(PASSES, "solve")?, sweep(PASSES, "relax")?);
                 let positions = ByBody::new(gpu, pipelines, "motion", "integrate_positions")?;
-                Self::Soft { start: Start::new(gpu, pipelines)?, solve, positions, relax }
+                Self::Soft { start: Start::new(gpu, pipelines, plan)?, solve, positions, relax }
             }
             solver::GAUSS_SEIDEL => {
                 let (visit, last) = (sweep(CLASSIC, "gauss_seidel")?, sweep(CLASSIC, "last_gauss_seidel")?);
                 let positions = ByBody::new(gpu, pipelines, "motion", "integrate_positions")?;
-                Self::GaussSeidel { start: Start::new(gpu, pipelines)?, visit, last, positions }
+                Self::GaussSeidel { start: Start::new(gpu, pipelines, plan)?, visit, last, positions }
             }
             solver::JACOBI => {
-                let (split, visit, last) =
-                    (sweep(CLASSIC, "split")?, sweep(CLASSIC, "jacobi")?, sweep(CLASSIC, "last_jacobi")?);
+                let mut sweep = |visit| Sweep::new(gpu, pipelines, CLASSIC, visit);
+                let (split, visit, last) = (sweep("split")?, sweep("jacobi")?, sweep("last_jacobi")?);
                 let mut body = |stem, entry| ByBody::new(gpu, pipelines, stem, entry);
                 let (begin, settle) = (body(CLASSIC, "begin")?, body(CLASSIC, "settle")?);
                 let positions = body("motion", "integrate_positions")?;
-                Self::Jacobi { split, start: Start::new(gpu, pipelines)?, begin, visit, last, settle, positions }
+                Self::Jacobi { split, start: Start::new(gpu, pipelines, plan)?, begin, visit, last, settle, positions }
             }
             solver::PENALTY => {
-                let press = sweep(CLASSIC, "penalty")?;
+                let press = Sweep::new(gpu, pipelines, CLASSIC, "penalty")?;
                 let mut body = |stem, entry| ByBody::new(gpu, pipelines, stem, entry);
                 let (first, settle) = (body("motion", "first_substep")?, body(CLASSIC, "settle")?);
                 Self::Penalty { first, press, settle, positions: body("motion", "integrate_positions")? }
@@ -182,29 +200,43 @@ impl Law {
     }
 }
 
+fn splits_last(step: &StepParams) -> bool {
+    step.batching & batching::SPLIT_LAST != 0
+}
+
 fn by_body(step: &StepParams) -> u32 {
     step.body_count.div_ceil(256)
 }
 
 impl Solver {
     /// With the law of this code (`StepParams::solver`).
-    pub(crate) fn new(gpu: &Gpu, pipelines: &mut Pipelines, plan: &Plan, law: u32) -> Result<Self> {
-        let restitution = plan.restitution.then(|| Sweep::new(gpu, pipelines, PASSES, "restitution")).transpose()?;
+    pub(crate) fn new(gpu: &Gpu, pipelines: &mut Pipelines, sizes: &Sizes, plan: &Plan, law: u32) -> Result<Self> {
+        let mut bounce = || Sweep::splitting(gpu, pipelines, plan, PASSES, "restitution");
+        let restitution = plan.restitution.then(&mut bounce).transpose()?;
         Ok(Self {
             bodies: pipelines.pass(gpu, "solver/prepare", "bodies")?,
+            split: plan.split.then(|| Split::new(gpu, pipelines, sizes)).transpose()?,
             constraints: pipelines.pass(gpu, "solver/prepare", "constraints")?,
             carry: pipelines.pass(gpu, "solver/prepare", "carry")?,
             rewind: plan.levels.then(|| ByBody::new(gpu, pipelines, "motion", "rewind")).transpose()?,
-            law: Law::new(gpu, pipelines, law)?,
+            law: Law::new(gpu, pipelines, plan, law)?,
             restitution,
             store: pipelines.pass(gpu, "solver/store", "store")?,
         })
+    }
+
+    /// Bytes of its own scratch.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.split.as_ref().map_or(0, Split::bytes)
     }
 
     pub(crate) fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
         recorder.stage("prepare");
         let own = buffers.buffer("dispatch_args")?;
         recorder.dispatch(&self.bodies, &[], by_body(step))?;
+        if let Some(split) = self.split.as_ref().filter(|_| splits_last(step)) {
+            split.record(recorder, buffers)?;
+        }
         recorder.dispatch_indirect(&self.constraints, &[], own, args::CONSTRAINTS)?;
         recorder.dispatch_indirect(&self.carry, &[], own, args::CONSTRAINTS)?;
         recorder.stage("solver");

@@ -57,14 +57,14 @@ impl Stages {
             island: plan.islands().then(|| Island::new(gpu, pipelines)).transpose()?,
             level: plan.levels.then(|| Level::new(gpu, pipelines)).transpose()?,
             batch: Batch::new(gpu, pipelines, sizes)?,
-            solver: Solver::new(gpu, pipelines, plan, built.solver)?,
+            solver: Solver::new(gpu, pipelines, sizes, plan, built.solver)?,
             motion: Motion::new(gpu, pipelines)?,
         })
     }
 
     /// Bytes of the stages' own scratch.
     pub(crate) fn bytes(&self) -> u64 {
-        self.broadphase.bytes() + self.broadphase.sort_bytes() + self.batch.bytes()
+        self.broadphase.bytes() + self.broadphase.sort_bytes() + self.batch.bytes() + self.solver.bytes()
     }
 
     /// Tells stages what they must know on the host before the step is submitted.

@@ -6,7 +6,8 @@ use tumble_core::layout::{
     Aabb, BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Control, EditRange, EditRecord,
     FoundManifold, Impulse, LEVELS, Manifold, ManifoldMemory, Pair, PoseRecord, Rest, SolverBody, StepParams,
 };
-use tumble_core::{PackedScene, Result};
+use tumble_core::limits::LAST_LIMIT;
+use tumble_core::{PackedScene, Plan, Result};
 use wgpu::BufferUsages;
 
 /// Words of `counters`, for passes that take a count from there.
@@ -47,6 +48,17 @@ pub(crate) struct Sizes {
     pub(crate) pairs: u32,
     /// Bodies if something asks for their islands, else 0.
     pub(crate) islands: u32,
+    /// Ends of constraints in the last batch if it is solved by mass splitting, else 0.
+    pub(crate) parts: u32,
+}
+
+impl Sizes {
+    /// What the plan needs beside bodies, colliders and pairs.
+    pub(crate) fn with(self, plan: &Plan) -> Self {
+        let islands = if plan.islands() { self.bodies } else { 0 };
+        let parts = if plan.split { 2 * self.pairs.min(LAST_LIMIT) } else { 0 };
+        Self { islands, parts, ..self }
+    }
 }
 
 /// Which count an array follows.
@@ -56,10 +68,11 @@ enum Per {
     Collider,
     Pair,
     Island,
+    Part,
 }
 
 /// Name, bytes of an element, what it follows, whether its content outlives a step.
-const ARRAYS: [(&str, usize, Per, bool); 36] = [
+const ARRAYS: [(&str, usize, Per, bool); 39] = [
     ("states", size_of::<BodyState>(), Per::Body, true),
     ("work_states", size_of::<BodyState>(), Per::Body, false),
     ("props", size_of::<BodyProps>(), Per::Body, true),
@@ -96,6 +109,9 @@ const ARRAYS: [(&str, usize, Per, bool); 36] = [
     ("heads", size_of::<ConstraintHead>(), Per::Pair, false),
     ("points", 4 * size_of::<ConstraintPoint>(), Per::Pair, false),
     ("impulses", 4 * size_of::<Impulse>(), Per::Pair, false),
+    ("part_bodies", 4, Per::Part, false),
+    ("part_ends", 4, Per::Part, false),
+    ("part_changes", 64, Per::Part, false),
 ];
 
 /// Part `index` of the buffer that holds the numbers 0 to 63, as the uniform `name`.
@@ -119,6 +135,7 @@ fn count(per: Per, sizes: &Sizes) -> u64 {
         Per::Collider => sizes.colliders,
         Per::Pair => sizes.pairs,
         Per::Island => sizes.islands,
+        Per::Part => sizes.parts,
     })
 }
 
@@ -134,6 +151,7 @@ pub(crate) fn create(gpu: &Gpu, packed: &PackedScene, sizes: &Sizes, edits: u32)
     buffers.alias("counters", "control");
     buffers.create(gpu, "step", size_of::<StepParams>() as u64, 1, uniform)?;
     buffers.create(gpu, "level_steps", 256, LEVELS.into(), uniform)?;
+    buffers.create(gpu, "part_count", 4, 1, storage)?;
     buffers.create(gpu, "class_histogram", 4, 1024, storage)?;
     buffers.create(gpu, "dispatch_args", 16, args::COUNT, storage | BufferUsages::INDIRECT)?;
     buffers.create(gpu, "edit_records", size_of::<EditRecord>() as u64, edits.into(), storage)?;

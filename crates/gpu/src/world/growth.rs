@@ -52,7 +52,7 @@ impl World {
         let control = self.buffers.buffer("control")?;
         let free_count: u32 = bytemuck::pod_read_unaligned(&read_now(&self.gpu, control, 20, 4)?);
         let free = read_now(&self.gpu, self.buffers.buffer("free_slots")?, 0, 4 * u64::from(free_count))?;
-        let sizes = Sizes { pairs: room, ..self.sizes };
+        let sizes = Sizes { pairs: room, ..self.sizes }.with(&self.built.plan);
         // On an error some arrays are larger than they must be, and the world is as good as before.
         store::grow(&self.gpu, &mut self.buffers, &sizes)
             .map_err(|e| if matches!(e, Error::Capacity { .. }) { error } else { e })?;
@@ -92,8 +92,7 @@ impl World {
 
     fn grow_scene(&mut self, sizes: Sizes) -> Result<()> {
         self.take_statuses(0)?;
-        let islands = if self.built.plan.islands() { sizes.bodies } else { 0 };
-        let sizes = Sizes { pairs: self.sizes.pairs, islands, ..sizes };
+        let sizes = sizes.with(&self.built.plan);
         store::grow(&self.gpu, &mut self.buffers, &sizes)?;
         self.stages = Stages::new(&self.gpu, &mut self.pipelines, &sizes, &self.built)?;
         self.pose_copies = Readback::new(&self.gpu, "pose copy", pose_bytes(&sizes), 1)?;

@@ -128,8 +128,7 @@ impl World {
         let pairs = limits::initial_pairs(&within(&gpu, &params), colliders);
         let room = Room::first(&params.capacities, bodies, colliders);
         let plan = packed.plan.with(&params);
-        let islands = if plan.islands() { room.bodies } else { 0 };
-        let sizes = Sizes { bodies: room.bodies, colliders: room.colliders, pairs, islands };
+        let sizes = Sizes { bodies: room.bodies, colliders: room.colliders, pairs, islands: 0, parts: 0 }.with(&plan);
         let buffers = store::create(&gpu, &packed, &sizes, room.edits)?;
         let poses: Vec<PoseRecord> =
             packed.states.iter().zip(&packed.props).map(|(s, p)| PoseRecord::of(s, p)).collect();
@@ -326,10 +325,8 @@ impl World {
         if widened || (wanted.choice, wanted.solver) != (choice, solver) {
             (wanted.choice, wanted.solver) = (choice, solver);
             let run = self.watch.begin("pipelines");
-            if wanted.plan.islands() && self.sizes.islands == 0 {
-                self.sizes.islands = self.sizes.bodies;
-                store::grow(&self.gpu, &mut self.buffers, &self.sizes)?;
-            }
+            self.sizes = self.sizes.with(&wanted.plan);
+            store::grow(&self.gpu, &mut self.buffers, &self.sizes)?;
             self.stages = Stages::new(&self.gpu, &mut self.pipelines, &self.sizes, &wanted)?;
             self.watch.end(run);
             self.built = wanted;
