@@ -3,7 +3,8 @@
 //! Standard scenes after 60 steps, on both sides: batches, rounds, constraints in the last batch, milliseconds of the
 //! stages `batch` and `solver`, dispatches a step. All worlds of a scene and a side live at once and step by turns, so
 //! that a noisy machine harms all alike; times are lower quartiles, and told as ratios to the default's too.
-//! `persistent, unfused` gives every batch a dispatch of its own. Beside them the scheme of the talk as it was, with
+//! `persistent, unfused` gives every batch a dispatch of its own. On hubs, the last batch in sequence and by mass splitting,
+//! with the deepest overlap that they leave. Beside them the scheme of the talk as it was, with
 //! timing played by random numbers; see `raw.rs`. Then what the order of the batches does to the errors of a few cases
 //! of `speed_vs_error`, on the CPU.
 //!
@@ -13,10 +14,10 @@
 mod raw;
 
 use std::fmt::Write;
-use tumble::{Accuracy, Batching, OnePass, Params, Scene, Soft, Solver, World, cpu, gpu};
+use tumble::{Accuracy, Batching, LastBatch, OnePass, Params, Scene, Soft, Solver, World, cpu, gpu};
 use tumble_bench::cases;
 use tumble_bench::run::quantile;
-use tumble_core::scenes;
+use tumble_core::{measures, scenes};
 
 /// A way of batching.
 #[derive(Clone, Copy, PartialEq)]
@@ -25,9 +26,13 @@ struct Way {
     static_last: bool,
     /// Whether small late batches share a dispatch.
     fused: bool,
+    last_batch: LastBatch,
 }
 
-const FUSED: Way = Way { batching: Batching::Persistent, static_last: false, fused: true };
+const FUSED: Way =
+    Way { batching: Batching::Persistent, static_last: false, fused: true, last_batch: LastBatch::Sequence };
+/// Where there is a last batch.
+const HUB_WAYS: [Way; 2] = [FUSED, Way { last_batch: LastBatch::MassSplitting, ..FUSED }];
 const WAYS: [Way; 7] = [
     FUSED,
     Way { fused: false, ..FUSED },
@@ -44,11 +49,13 @@ impl Way {
     fn name(&self) -> String {
         let last = if self.static_last { ", static last" } else { "" };
         let fused = if self.fused { "" } else { ", unfused" };
-        format!("{}{last}{fused}", self.batching)
+        let split = if self.last_batch == LastBatch::MassSplitting { ", mass splitting" } else { "" };
+        format!("{}{last}{fused}{split}", self.batching)
     }
 
     fn params(&self) -> Params {
-        Params { batching: self.batching, static_contacts_last: self.static_last, ..Params::default() }
+        let Self { batching, static_last: static_contacts_last, last_batch, .. } = *self;
+        Params { batching, static_contacts_last, last_batch, ..Params::default() }
     }
 }
 
@@ -127,7 +134,20 @@ struct Settings {
     steps_a_round: usize,
 }
 
-fn compare(name: &str, scene: &Scene, device: Option<&gpu::Gpu>, settings: &Settings) -> Vec<Row> {
+/// The hub with a plate so light that it weighs less than a hundredth of what it carries.
+fn light_hub(bodies: usize) -> Scene {
+    let source = scenes::hub(bodies);
+    let mut scene = Scene::new();
+    for (i, handle) in source.bodies().enumerate() {
+        let body = source.body(handle).expect("it was just listed").clone();
+        let (_, collider) = source.colliders_of(handle).expect("it was just listed")[0];
+        let collider = if i == 1 { collider.clone().density(1.0) } else { collider.clone() };
+        scene.insert(body, collider);
+    }
+    scene
+}
+
+fn compare(name: &str, scene: &Scene, ways: &[Way], device: Option<&gpu::Gpu>, settings: &Settings) -> Vec<Row> {
     let side = if device.is_some() { "gpu" } else { "cpu" };
     let start = |way: &Way| {
         let params = Params { profile: true, ..way.params() };
@@ -145,7 +165,7 @@ fn compare(name: &str, scene: &Scene, device: Option<&gpu::Gpu>, settings: &Sett
         Lane::new(*way, world)
     };
     // Without dispatches there is nothing to fuse.
-    let mut lanes: Vec<_> = WAYS.iter().filter(|way| way.fused || device.is_some()).map(start).collect();
+    let mut lanes: Vec<_> = ways.iter().filter(|way| way.fused || device.is_some()).map(start).collect();
     for lane in &mut lanes {
         (0..settings.warm_up).for_each(|_| lane.step(false));
     }
@@ -159,12 +179,23 @@ fn compare(name: &str, scene: &Scene, device: Option<&gpu::Gpu>, settings: &Sett
     }
     println!("{name}, {side}:");
     println!(
-        "  {:<30} {:>7} {:>7} {:>5} {:>12} {:>11} {:>9} {:>7} {:>10} {:>7}",
-        "way", "batches", "rounds", "last", "constraints", "dispatches", "batch ms", "ratio", "solver ms", "ratio"
+        "  {:<30} {:>7} {:>7} {:>5} {:>12} {:>11} {:>9} {:>7} {:>10} {:>7} {:>10}",
+        "way",
+        "batches",
+        "rounds",
+        "last",
+        "constraints",
+        "dispatches",
+        "batch ms",
+        "ratio",
+        "solver ms",
+        "ratio",
+        "overlap mm"
     );
     let mut base = None;
     let mut all = Vec::new();
-    for lane in lanes {
+    for mut lane in lanes {
+        let overlap = measures::penetration(scene, &lane.world.poses().expect("poses"));
         let mean = |sum: f64| sum / lane.steps;
         let (batch, solver) = (lower_quartile(&lane.batch_ms), lower_quartile(&lane.solver_ms));
         let (batch_base, solver_base) = *base.get_or_insert((batch, solver));
@@ -178,10 +209,11 @@ fn compare(name: &str, scene: &Scene, device: Option<&gpu::Gpu>, settings: &Sett
             ("stage batch to default", "ratio", batch / batch_base),
             ("stage solver", "ms", solver),
             ("stage solver to default", "ratio", solver / solver_base),
+            ("deepest overlap", "mm", 1e3 * overlap.max_m),
         ];
         let v = values.map(|(_, _, value)| value);
         println!(
-            "  {:<30} {:7.1} {:7.1} {:5.0} {:12.0} {:11.0} {:9.3} {:7.2} {:10.3} {:7.2}",
+            "  {:<30} {:7.1} {:7.1} {:5.0} {:12.0} {:11.0} {:9.3} {:7.2} {:10.3} {:7.2} {:10.5}",
             lane.way.name(),
             v[0],
             v[1],
@@ -191,7 +223,8 @@ fn compare(name: &str, scene: &Scene, device: Option<&gpu::Gpu>, settings: &Sett
             v[5],
             v[6],
             v[7],
-            v[8]
+            v[8],
+            v[9]
         );
         all.extend(rows(name, side, &lane.way.name(), &values));
     }
@@ -308,11 +341,25 @@ fn main() {
     };
     let mut all = Vec::new();
     for (name, scene) in scenes.iter().filter(|(name, _)| wanted(name)) {
-        all.extend(compare(name, scene, None, &settings));
+        all.extend(compare(name, scene, &WAYS, None, &settings));
         if let Some(device) = &device {
-            all.extend(compare(name, scene, Some(device), &settings));
+            all.extend(compare(name, scene, &WAYS, Some(device), &settings));
         }
         all.extend(raw(name, scene, &settings));
+    }
+    let hubs = match quick {
+        true => vec![("hub, last batch", scenes::hub(100))],
+        false => vec![
+            ("hub, last batch", scenes::hub(500)),
+            ("light hub, last batch", light_hub(500)),
+            ("large hub, last batch", scenes::hub(4000)),
+        ],
+    };
+    for (name, scene) in hubs.iter().filter(|(name, _)| wanted(name)) {
+        all.extend(compare(name, scene, &HUB_WAYS, None, &settings));
+        if let Some(device) = &device {
+            all.extend(compare(name, scene, &HUB_WAYS, Some(device), &settings));
+        }
     }
     for case in cases::ALL.iter().filter(|case| CASES.contains(&case.name) && wanted(case.name)) {
         all.extend(errors(case, Solver::OnePass(OnePass::default()), substeps, quick));

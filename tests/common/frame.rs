@@ -8,7 +8,7 @@ use tumble_cpu::batch::{self, Batches, Ends};
 use tumble_cpu::broadphase::{Boxes, brute_force};
 use tumble_cpu::contact::{self, Matched, NO_FEATURE};
 use tumble_cpu::solver::prepare::{Contact, prepare_body, prepare_constraint, scale};
-use tumble_cpu::solver::{Bodies, PlainRows, solve_plain, store};
+use tumble_cpu::solver::{Bodies, PlainRows, solve_plain, split, store};
 use tumble_cpu::{bounds, continuous, motion, narrowphase};
 
 /// What lives from step to step.
@@ -39,6 +39,19 @@ pub(crate) struct Frame {
     pub(crate) manifolds: Vec<Manifold>,
     pub(crate) ends: Vec<Ends>,
     pub(crate) batches: Batches,
+}
+
+impl Frame {
+    /// Whether the last batch is solved by mass splitting.
+    pub(crate) fn splits_last(&self) -> bool {
+        self.step.batching & batching::SPLIT_LAST != 0
+    }
+
+    /// Its constraints.
+    pub(crate) fn last_batch(&self) -> std::ops::Range<usize> {
+        let last = LAST_BATCH as usize;
+        self.batches.start[last] as usize..self.batches.start[last + 1] as usize
+    }
 }
 
 /// A scene of so many bodies in all, some of them fixed.
@@ -108,8 +121,13 @@ impl Cpu {
 
     /// The same by this solver.
     pub(crate) fn after_by(solver: Solver, scene: &Scene, steps: u32) -> Self {
+        Self::after_with(Params { solver, ..Params::default() }, scene, steps)
+    }
+
+    /// The same with these parameters.
+    pub(crate) fn after_with(params: Params, scene: &Scene, steps: u32) -> Self {
         let mut cpu = Self::new(scene);
-        cpu.params.solver = solver;
+        cpu.params = params;
         for _ in 0..steps {
             let frame = cpu.plan(false);
             cpu.commit(&frame);
@@ -150,13 +168,26 @@ impl Cpu {
 
     pub(crate) fn bodies(&self, frame: &Frame) -> Vec<SolverBody> {
         let bodies = frame.states.iter().zip(&self.props).zip(&frame.batches.masks);
-        bodies.map(|((state, props), mask)| prepare_body(state, props, *mask, &frame.step)).collect()
+        let mut bodies: Vec<_> =
+            bodies.map(|((state, props), mask)| prepare_body(state, props, *mask, &frame.step)).collect();
+        if frame.splits_last() {
+            let ends = frame.last_batch().map(|c| {
+                let pair = &frame.matched.pairs[frame.batches.order[c] as usize];
+                [pair.a, pair.b].map(|collider| self.colliders[collider as usize].body as usize)
+            });
+            split::count_parts(&mut bodies, ends);
+        }
+        bodies
     }
 
     pub(crate) fn rows(&self, frame: &Frame, bodies: &[SolverBody]) -> PlainRows {
-        PlainRows::build(0..frame.batches.order.len(), |c| {
+        let mut rows = PlainRows::build(0..frame.batches.order.len(), |c| {
             prepare_constraint(&self.contact(frame, c), &self.colliders, bodies, &frame.states, &frame.step)
-        })
+        });
+        if frame.splits_last() {
+            rows.split_last(frame.last_batch().len(), bodies);
+        }
+        rows
     }
 
     /// What constraint c of the frame is made of.
@@ -166,7 +197,8 @@ impl Cpu {
         let stored = &self.impulses[4 * pair.slot as usize..][..4];
         let memory = &self.memory[pair.slot as usize];
         let [a, b] = [pair.a, pair.b].map(|c| &frame.states[self.colliders[c as usize].body as usize]);
-        Contact { pair, manifold: &frame.manifolds[index], stored, memory, scale: scale(a, b, frame.step.h) }
+        let split = frame.splits_last() && frame.last_batch().contains(&c);
+        Contact { pair, manifold: &frame.manifolds[index], stored, memory, scale: scale(a, b, frame.step.h), split }
     }
 
     /// Impulses by slot as they are after `rows` were solved; slots without a constraint stay as they are.

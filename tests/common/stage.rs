@@ -2,7 +2,7 @@
 
 use bytemuck::Zeroable;
 use tumble_core::layout::*;
-use tumble_core::{GaussSeidel, Jacobi, OnePass, Penalty, Scene, Soft, Solver, scenes};
+use tumble_core::{GaussSeidel, Jacobi, LastBatch, OnePass, Params, Penalty, Scene, Soft, Solver, scenes};
 use tumble_cpu::solver::{Bodies, PlainRows, Visit, solve_plain};
 
 use crate::alone::{Alone, Chain};
@@ -53,7 +53,11 @@ impl Stage {
     }
 
     pub(crate) fn by(solver: Solver, scene: &Scene, steps: u32) -> Self {
-        let cpu = Cpu::after_by(solver, scene, steps);
+        Self::with(Params { solver, ..Params::default() }, scene, steps)
+    }
+
+    pub(crate) fn with(params: Params, scene: &Scene, steps: u32) -> Self {
+        let cpu = Cpu::after_with(params, scene, steps);
         let frame = cpu.plan(false);
         let mut control = control_of(&frame, false);
         control.batch_start[..65].copy_from_slice(&frame.batches.start);
@@ -75,9 +79,12 @@ impl Stage {
             move |what: String, scene: &Scene, steps| (format!("{solver}, {what}"), Self::by(solver, scene, steps));
         let sizes = SIZES.into_iter().map(move |bodies| of(format!("{bodies} bodies"), &scene_of(bodies), 40));
         let hub = of("hub".to_owned(), &scenes::hub(500), 2);
+        let params = Params { solver, last_batch: LastBatch::MassSplitting, ..Params::default() };
+        let split = Self::with(params, &scenes::hub(500), 2);
+        let split = split.frame.splits_last().then(|| (format!("{solver}, hub, split"), split));
         // So deep that overlap is undone at the highest speed.
         let overlap = of("overlap".to_owned(), &scenes::overlap_cube().0, 0);
-        sizes.chain([hub, overlap])
+        sizes.chain([hub, overlap]).chain(split)
     }
 
     /// Fills the places of points that are not in use, as an earlier step would.
@@ -120,11 +127,32 @@ impl Stage {
         alone.put("heads", &self.rows.heads);
         alone.put("points", &self.rows.points);
         alone.put("impulses", &self.rows.impulses);
+        if self.frame.splits_last() {
+            self.put_parts(alone);
+        }
+    }
+
+    /// What is listed of the parts of bodies.
+    pub(crate) fn put_parts(&self, alone: &mut Alone) {
+        let (bodies, ends): (Vec<u32>, Vec<u32>) = self.parts().into_iter().unzip();
+        alone.put("part_bodies", &bodies);
+        alone.put("part_ends", &ends);
+        // Of a step before.
+        alone.put("part_changes", &vec![f32::NAN; 16 * ends.len()]);
+    }
+
+    /// Ends of the last batch's constraints by body: (body or no number of any, twice the constraint plus the side).
+    pub(crate) fn parts(&self) -> Vec<(u32, u32)> {
+        let first = self.control.batch_start[LAST_BATCH as usize] as usize;
+        let slots = self.rows.heads[first..].iter().flat_map(|head| [head.body_a, head.body_b]);
+        let moving = |slot: u32| self.bodies[slot as usize].inverse_mass > 0.0;
+        let mut ends: Vec<_> = slots.map(|slot| if moving(slot) { slot } else { u32::MAX }).zip(0..).collect();
+        ends.sort();
+        ends
     }
 
     pub(crate) fn take_solver(alone: &Alone) -> (Vec<SolverBody>, PlainRows) {
-        let rows =
-            PlainRows { heads: alone.take("heads"), points: alone.take("points"), impulses: alone.take("impulses") };
+        let rows = PlainRows::new(alone.take("heads"), alone.take("points"), alone.take("impulses"));
         (alone.take("solver_bodies"), rows)
     }
 
@@ -144,6 +172,9 @@ impl Stage {
             chain.indexed(stem, entry, ("batch", batch), groups);
         }
         chain.pass(stem, &format!("{entry}_tail"), 1);
+        if self.frame.splits_last() {
+            chain.pass("solver/split", &format!("{entry}_split"), 1);
+        }
     }
 
     /// All sub-steps of a step on the GPU, and the bounces, with 8 wide batches.

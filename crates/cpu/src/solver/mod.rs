@@ -191,6 +191,11 @@ impl Rows {
 }
 
 impl PlainRows {
+    /// These rows, all in sequence.
+    pub fn new(heads: Vec<ConstraintHead>, points: Vec<ConstraintPoint>, impulses: Vec<Impulse>) -> Self {
+        Self { heads, points, impulses, parts: Parts::default() }
+    }
+
     /// Builds constraints `range` of `make`.
     pub fn build(range: std::ops::Range<usize>, make: impl Fn(usize) -> PlainConstraint) -> Self {
         let mut rows = Self::default();
