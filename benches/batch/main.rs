@@ -134,14 +134,14 @@ struct Settings {
     steps_a_round: usize,
 }
 
-/// The hub with a plate so light that it weighs less than a hundredth of what it carries.
-fn light_hub(bodies: usize) -> Scene {
+/// The hub with a plate of this density, kg/m³, not 1,000.
+fn hub_of(density: f32, bodies: usize) -> Scene {
     let source = scenes::hub(bodies);
     let mut scene = Scene::new();
     for (i, handle) in source.bodies().enumerate() {
         let body = source.body(handle).expect("it was just listed").clone();
         let (_, collider) = source.colliders_of(handle).expect("it was just listed")[0];
-        let collider = if i == 1 { collider.clone().density(1.0) } else { collider.clone() };
+        let collider = if i == 1 { collider.clone().density(density) } else { collider.clone() };
         scene.insert(body, collider);
     }
     scene
@@ -351,7 +351,10 @@ fn main() {
         true => vec![("hub, last batch", scenes::hub(100))],
         false => vec![
             ("hub, last batch", scenes::hub(500)),
-            ("light hub, last batch", light_hub(500)),
+            // The plate weighs what it carries, a tenth of that, a hundredth.
+            ("hub of 1/1, last batch", hub_of(117.0, 500)),
+            ("hub of 1/10, last batch", hub_of(11.7, 500)),
+            ("hub of 1/100, last batch", hub_of(1.17, 500)),
             ("large hub, last batch", scenes::hub(4000)),
         ],
     };
