@@ -250,14 +250,16 @@ mod tests {
         let masks = [a.simd_eq(b), a.simd_gt(b), a.simd_lt(b), a.is_finite()];
         let chosen = masks.map(|mask| mask.bitselect(a, b));
         let inside = masks.map(|mask| (!mask & a) | (mask & b));
-        // The mask's one lane alone, lane by lane.
-        let mut any = masks;
-        for (any, lane) in any.iter_mut().flat_map(|any| any.as_mut_array().iter_mut().enumerate().map(|(i, x)| (x, i)))
-        {
-            let mut only = L::ZERO;
-            only.as_mut_array()[lane] = f32::from_bits(any.to_bits());
-            *any = f32::from(u8::from(only.any()));
-        }
+        // Of each mask, one lane alone at a time.
+        let any = masks.map(|mask| {
+            let mut any = L::ZERO;
+            for lane in 0..L::COUNT {
+                let mut only = L::ZERO;
+                only.as_mut_array()[lane] = mask.as_array()[lane];
+                any.as_mut_array()[lane] = f32::from(u8::from(only.any()));
+            }
+            any
+        });
         let numbers =
             [sum, difference, a + b, a - b, a * b, a / b, -a, a.abs(), a.sqrt(), a.fast_min(b), a.fast_max(b)];
         let bits = |x: &f32| if x.is_nan() { f32::NAN.to_bits() } else { x.to_bits() };
