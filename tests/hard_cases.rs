@@ -5,7 +5,7 @@ mod common;
 
 use std::f32::consts::PI;
 use tumble::prelude::*;
-use tumble_core::{measures, scenes};
+use tumble_core::{Accuracy, measures, scenes};
 
 /// Runs `case` on the CPU and on the GPU.
 fn on_both(case: impl Fn(&str, &dyn Fn(Scene, Params) -> World)) {
@@ -270,7 +270,8 @@ fn odd_parameters_stay_finite() {
             for gravity in [0.0f32, 9.81, 1000.0] {
                 let mut scene = scenes::mixed(40);
                 scene.gravity = Vec3::new(0.0, -gravity, 0.0);
-                let mut world = make(scene.clone(), Params { dt, substeps, ..Params::default() });
+                let mut world =
+                    make(scene.clone(), Params { dt, accuracy: Accuracy::Substeps(substeps), ..Params::default() });
                 run(&mut world, 40);
                 let (poses, velocities) = (world.poses().expect("poses"), world.velocities().expect("velocities"));
                 let energy = measures::kinetic_energy(&scene, &poses, &velocities);

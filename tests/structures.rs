@@ -6,7 +6,7 @@ mod common;
 
 use tumble::prelude::*;
 use tumble_bench::engines::RapierWorld;
-use tumble_core::{measures, scenes};
+use tumble_core::{Accuracy, measures, scenes};
 
 /// What became of a structure; printed.
 #[derive(Debug, Clone, Copy)]
@@ -75,7 +75,7 @@ fn run(scene: &Scene, mut world: Any, steps: usize, limit: f64) -> End {
 
 /// Both sides and rapier with so many sub-steps; `limit`, m: beyond this it counts as fallen.
 fn ends(case: &str, scene: &Scene, substeps: u32, steps: usize, limit: f64) -> [End; 3] {
-    let params = Params { threads: Some(1), substeps, ..Params::default() };
+    let params = Params { threads: Some(1), accuracy: Accuracy::Substeps(substeps), ..Params::default() };
     let gpu = tumble_gpu::World::with_gpu(common::gpu().clone(), scene.clone(), params).expect("valid");
     let sides = [
         ("cpu", Any::Ours(World::new(scene.clone(), params, Backend::Cpu).expect("valid"))),

@@ -5,7 +5,9 @@
 
 use super::lanes::{BodyLanes, ConstraintLanes, Weights};
 use super::simd::Lanes;
-use super::{Bodies, Pass, Rows, Visit, gauss_seidel_lanes, jacobi_lanes, one_pass_lanes, penalty_lanes, soft_lanes};
+use super::{
+    Bodies, Pass, Rows, Visit, gauss_seidel_lanes, jacobi_lanes, one_pass_lanes, penalty_lanes, soft_lanes, takes_part,
+};
 use crate::shared::Shared;
 use crate::workers::{block_of, blocks, run_stages};
 use std::ops::Range;
@@ -71,7 +73,9 @@ pub(super) fn run(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, passes
             for i in block_of(&all, block, body_blocks) {
                 // SAFETY: blocks of a stage share no body.
                 let body = unsafe { &mut bodies.slice_mut(i..i + 1)[0] };
-                each(body, &states[i], &props[i], step);
+                if takes_part(body, &states[i], step) {
+                    each(body, &states[i], &props[i], step);
+                }
             }
         }
         (Pass::Sweep(visit), Some(part)) => {
@@ -97,57 +101,24 @@ pub(super) fn sweep<L: Lanes>(
     visit: Visit,
 ) {
     use Visit::*;
-    // The visit is a constant in each of these functions.
-    match visit {
-        WarmStart => L::run(
-            #[inline(always)]
-            || visit_all(WarmStart, groups, bodies, step),
-        ),
-        Solve => L::run(
-            #[inline(always)]
-            || visit_all(Solve, groups, bodies, step),
-        ),
-        Relax => L::run(
-            #[inline(always)]
-            || visit_all(Relax, groups, bodies, step),
-        ),
-        Load => L::run(
-            #[inline(always)]
-            || visit_all(Load, groups, bodies, step),
-        ),
-        Pass => L::run(
-            #[inline(always)]
-            || visit_all(Pass, groups, bodies, step),
-        ),
-        GaussSeidel => L::run(
-            #[inline(always)]
-            || visit_all(GaussSeidel, groups, bodies, step),
-        ),
-        LastGaussSeidel => L::run(
-            #[inline(always)]
-            || visit_all(LastGaussSeidel, groups, bodies, step),
-        ),
-        Split => L::run(
-            #[inline(always)]
-            || visit_all(Split, groups, bodies, step),
-        ),
-        Jacobi => L::run(
-            #[inline(always)]
-            || visit_all(Jacobi, groups, bodies, step),
-        ),
-        LastJacobi => L::run(
-            #[inline(always)]
-            || visit_all(LastJacobi, groups, bodies, step),
-        ),
-        Penalty => L::run(
-            #[inline(always)]
-            || visit_all(Penalty, groups, bodies, step),
-        ),
-        Restitution => L::run(
-            #[inline(always)]
-            || visit_all(Restitution, groups, bodies, step),
-        ),
-    }
+    L::run(
+        #[inline(always)]
+        || match visit {
+            // The visit is a constant in each of these loops.
+            WarmStart => visit_all(WarmStart, groups, bodies, step),
+            Solve => visit_all(Solve, groups, bodies, step),
+            Relax => visit_all(Relax, groups, bodies, step),
+            Load => visit_all(Load, groups, bodies, step),
+            Pass => visit_all(Pass, groups, bodies, step),
+            GaussSeidel => visit_all(GaussSeidel, groups, bodies, step),
+            LastGaussSeidel => visit_all(LastGaussSeidel, groups, bodies, step),
+            Split => visit_all(Split, groups, bodies, step),
+            Jacobi => visit_all(Jacobi, groups, bodies, step),
+            LastJacobi => visit_all(LastJacobi, groups, bodies, step),
+            Penalty => visit_all(Penalty, groups, bodies, step),
+            Restitution => visit_all(Restitution, groups, bodies, step),
+        },
+    );
 }
 
 #[inline(always)]
