@@ -134,7 +134,7 @@ fn json_has_the_documented_fields() {
     assert_eq!(json["broadphase"], "grid");
     assert!(json["broadphase_bytes_per_body"].as_f64().unwrap() > 10.0);
     assert_eq!((&json["scene"], &json["backend"]), (&"pile".into(), &"cpu".into()));
-    assert!(json["adapter"].as_str().unwrap().contains("2 threads"));
+    assert!(json["adapter"].as_str().unwrap().contains(" lanes, 2 threads"));
     assert_eq!(json["dt"].as_f64().unwrap() as f32, 0.01);
     assert!(keys(&json["growths"]).is_empty());
     let (median, p95) = (json["ms_per_step"]["median"].as_f64().unwrap(), json["ms_per_step"]["p95"].as_f64().unwrap());
