@@ -100,23 +100,22 @@ pub(super) fn sweep<L: Lanes>(
     step: &StepParams,
     visit: Visit,
 ) {
-    use Visit::*;
     L::run(
         #[inline(always)]
         || match visit {
             // The visit is a constant in each of these loops.
-            WarmStart => visit_all(WarmStart, groups, bodies, step),
-            Solve => visit_all(Solve, groups, bodies, step),
-            Relax => visit_all(Relax, groups, bodies, step),
-            Load => visit_all(Load, groups, bodies, step),
-            Pass => visit_all(Pass, groups, bodies, step),
-            GaussSeidel => visit_all(GaussSeidel, groups, bodies, step),
-            LastGaussSeidel => visit_all(LastGaussSeidel, groups, bodies, step),
-            Split => visit_all(Split, groups, bodies, step),
-            Jacobi => visit_all(Jacobi, groups, bodies, step),
-            LastJacobi => visit_all(LastJacobi, groups, bodies, step),
-            Penalty => visit_all(Penalty, groups, bodies, step),
-            Restitution => visit_all(Restitution, groups, bodies, step),
+            Visit::WarmStart => visit_all(Visit::WarmStart, groups, bodies, step),
+            Visit::Solve => visit_all(Visit::Solve, groups, bodies, step),
+            Visit::Relax => visit_all(Visit::Relax, groups, bodies, step),
+            Visit::Load => visit_all(Visit::Load, groups, bodies, step),
+            Visit::Pass => visit_all(Visit::Pass, groups, bodies, step),
+            Visit::GaussSeidel => visit_all(Visit::GaussSeidel, groups, bodies, step),
+            Visit::LastGaussSeidel => visit_all(Visit::LastGaussSeidel, groups, bodies, step),
+            Visit::Split => visit_all(Visit::Split, groups, bodies, step),
+            Visit::Jacobi => visit_all(Visit::Jacobi, groups, bodies, step),
+            Visit::LastJacobi => visit_all(Visit::LastJacobi, groups, bodies, step),
+            Visit::Penalty => visit_all(Visit::Penalty, groups, bodies, step),
+            Visit::Restitution => visit_all(Visit::Restitution, groups, bodies, step),
         },
     );
 }
