@@ -1,12 +1,11 @@
 //! What each way of batching takes and leaves: `cargo bench --bench batch`.
 //!
 //! Standard scenes after 60 steps, on both sides: batches, rounds, constraints in the last batch, milliseconds of the
-//! stages `batch` and `solver`, dispatches a step. All worlds of a scene and a side live at once and step by turns, so
-//! that a noisy machine harms all alike; times are lower quartiles, and told as ratios to the default's too.
-//! `persistent, unfused` gives every batch a dispatch of its own. On hubs, the last batch in sequence and by mass splitting,
-//! with the deepest overlap that they leave. Beside them the scheme of the talk as it was, with
-//! timing played by random numbers; see `raw.rs`. Then what the order of the batches does to the errors of a few cases
-//! of `speed_vs_error`, on the CPU.
+//! stages `batch`, `prepare` and `solver`, dispatches a step, and the deepest overlap in the end. All worlds of a scene and a
+//! side live at once and step by turns, so that a noisy machine harms all alike; times are lower quartiles, and told as ratios
+//! to the default's too. `persistent, unfused` gives every batch a dispatch of its own. Hubs, with the last batch in sequence
+//! and by mass splitting. Beside them the scheme of the talk as it was, with timing played by random numbers; see `raw.rs`.
+//! Then what the order of the batches does to the errors of a few cases of `speed_vs_error`, on the CPU.
 //!
 //! `--quick` runs one small iteration of everything, as a test; `--only TEXT` takes the scenes and cases whose name
 //! holds the text; `--no-gpu` leaves out the GPU; `--csv FILE` writes the table.
@@ -94,14 +93,15 @@ struct Lane {
     constraints: f64,
     dispatches: f64,
     batch_ms: Vec<f64>,
+    prepare_ms: Vec<f64>,
     solver_ms: Vec<f64>,
 }
 
 impl Lane {
     fn new(way: Way, world: World) -> Self {
-        let (batch_ms, solver_ms) = (Vec::new(), Vec::new());
+        let [batch_ms, prepare_ms, solver_ms] = [const { Vec::new() }; 3];
         let [steps, batches, rounds, last, constraints, dispatches] = [0.0; 6];
-        Self { way, world, steps, batches, rounds, last, constraints, dispatches, batch_ms, solver_ms }
+        Self { way, world, steps, batches, rounds, last, constraints, dispatches, batch_ms, prepare_ms, solver_ms }
     }
 
     fn step(&mut self, measured: bool) {
@@ -121,6 +121,7 @@ impl Lane {
         for stage in report.stages {
             match stage.stage {
                 "batch" => self.batch_ms.extend(stage.milliseconds),
+                "prepare" => self.prepare_ms.extend(stage.milliseconds),
                 "solver" => self.solver_ms.extend(stage.milliseconds),
                 _ => {}
             }
@@ -179,7 +180,7 @@ fn compare(name: &str, scene: &Scene, ways: &[Way], device: Option<&gpu::Gpu>, s
     }
     println!("{name}, {side}:");
     println!(
-        "  {:<30} {:>7} {:>7} {:>5} {:>12} {:>11} {:>9} {:>7} {:>10} {:>7} {:>10}",
+        "  {:<30} {:>7} {:>7} {:>5} {:>12} {:>11} {:>9} {:>7} {:>10} {:>10} {:>7} {:>10}",
         "way",
         "batches",
         "rounds",
@@ -188,6 +189,7 @@ fn compare(name: &str, scene: &Scene, ways: &[Way], device: Option<&gpu::Gpu>, s
         "dispatches",
         "batch ms",
         "ratio",
+        "prepare ms",
         "solver ms",
         "ratio",
         "overlap mm"
@@ -207,13 +209,14 @@ fn compare(name: &str, scene: &Scene, ways: &[Way], device: Option<&gpu::Gpu>, s
             ("dispatches", "1", mean(lane.dispatches)),
             ("stage batch", "ms", batch),
             ("stage batch to default", "ratio", batch / batch_base),
+            ("stage prepare", "ms", lower_quartile(&lane.prepare_ms)),
             ("stage solver", "ms", solver),
             ("stage solver to default", "ratio", solver / solver_base),
             ("deepest overlap", "mm", 1e3 * overlap.max_m),
         ];
         let v = values.map(|(_, _, value)| value);
         println!(
-            "  {:<30} {:7.1} {:7.1} {:5.0} {:12.0} {:11.0} {:9.3} {:7.2} {:10.3} {:7.2} {:10.5}",
+            "  {:<30} {:7.1} {:7.1} {:5.0} {:12.0} {:11.0} {:9.3} {:7.2} {:10.3} {:10.3} {:7.2} {:10.5}",
             lane.way.name(),
             v[0],
             v[1],
@@ -224,7 +227,8 @@ fn compare(name: &str, scene: &Scene, ways: &[Way], device: Option<&gpu::Gpu>, s
             v[6],
             v[7],
             v[8],
-            v[9]
+            v[9],
+            v[10]
         );
         all.extend(rows(name, side, &lane.way.name(), &values));
     }
