@@ -236,9 +236,9 @@ fn closed_system_keeps_momentum() {
             let (p1, l1) = momenta(&mut world);
             let (linear, angular) = ((p1 - p0).length() / scale, (l1 - l0).length() / scale);
             let (n, ask) = (substeps(by, SUBSTEPS), if by == By::Rapier { Ask::Said } else { Ask::AtMost(1e-6) });
-            let held = case.row(by, n, &format!("linear over sum |p|, dt 1/{rate} s"), "1", linear, ask);
+            let held = case.row(by, n, &format!("linear over sum of abs(p), dt 1/{rate} s"), "1", linear, ask);
             assert!(held, "{by:?}: linear momentum drifts by {linear}");
-            case.row(by, n, &format!("angular over sum |p|, dt 1/{rate} s"), "m", angular, Ask::Beside(1e-5));
+            case.row(by, n, &format!("angular over sum of abs(p), dt 1/{rate} s"), "m", angular, Ask::Beside(1e-5));
             drifts.push(angular);
         }
     }

@@ -205,6 +205,10 @@ pub(crate) fn compare(case: &Case, plan: &Plan, held: &[Held]) -> Vec<String> {
     for Held(Quantity { name, unit, of, floor }, share, most) in held {
         let value = |by| all.iter().find(|(b, _)| *b == by).map_or(f64::NAN, |(_, ends)| median(ends, *of));
         let theirs = value(By::Rapier);
+        if By::OURS.into_iter().all(|by| value(by).is_nan()) {
+            // Both have fallen, as the time that they stood has told.
+            continue;
+        }
         for &by in plan.by {
             let ours = value(by);
             case.row(by, n(by), name, unit, ours, Ask::Beside(*floor));

@@ -80,7 +80,9 @@ impl Case {
         let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
         let folder = std::env::var_os("HARD_CASES").map(PathBuf::from);
         let file = folder.map(|folder| folder.join(format!("{row}-{plain}.csv")));
-        Self { name: name.into(), file, lines: Mutex::default() }
+        // Blanks in front of a number are for the order of the files.
+        let name = name.split_whitespace().collect::<Vec<_>>().join(" ");
+        Self { name, file, lines: Mutex::default() }
     }
 
     /// Its name in the table.
@@ -104,7 +106,7 @@ impl Case {
             Ask::AtLeast(limit) => (format!("at least {}", number(limit)), None, Some(value >= limit)),
             Ask::Beside(small) => {
                 floor = Some(small);
-                (format!("as rapier, floor {}", number(small)), None, None)
+                (format!("as rapier; floor {}", number(small)), None, None)
             }
         };
         let (case, quantity, unit) = (self.name.clone(), quantity.to_owned(), unit.to_owned());
@@ -131,6 +133,31 @@ struct Row {
 const SECTIONS: [(char, &str); 4] =
     [('A', "Analytic"), ('B', "Stacks, structures and heaps"), ('C', "Ratios of mass"), ('D', "Extremes")];
 
+const LEAD: &str = "dt 1/60 s, friction 0.6 and sleep off unless a row says otherwise; sub-steps are tumble's / rapier's, 8 and 4 \
+    being what each takes of itself. Ratio: tumble's number over rapier's, of the side that does worse. Verdicts: an error \
+    is *a tenth* of rapier's or less, *none* when it is below the row's floor, *better* or *no worse* (by 10 % or the \
+    floor); what is asked in numbers is *held* or *missed*.";
+
+/// Columns of the table, as they stand in its CSV.
+const COLUMNS: [&str; 16] = [
+    "section",
+    "case",
+    "quantity",
+    "unit",
+    "cpu",
+    "gpu",
+    "rapier",
+    "ratio",
+    "exact",
+    "asked",
+    "substeps",
+    "rapier_substeps",
+    "verdict",
+    "machine",
+    "commit",
+    "date",
+];
+
 /// Reads what the cases left in `folder`, and writes `hard_cases.csv` and `hard_cases.md` to `out`; `closing` ends the
 /// latter.
 ///
@@ -138,54 +165,46 @@ const SECTIONS: [(char, &str); 4] =
 /// When a file cannot be read or written, or is none of a case.
 pub fn merge(folder: &Path, out: &Path, closing: &str) -> Result<(), String> {
     let rows = read(folder)?;
-    let machine = Machine::this();
+    let Machine { name: machine, commit, date } = Machine::this();
     let told = |e: &dyn std::fmt::Display| format!("cannot write to {}: {e}", out.display());
     let mut table = csv::Writer::from_path(out.join("hard_cases.csv")).map_err(|e| told(&e))?;
-    let head = "section,case,quantity,unit,cpu,gpu,rapier,exact,asked,ratio,substeps,rapier_substeps,verdict,machine,commit,date";
-    table.write_record(head.split(',')).map_err(|e| told(&e))?;
-    let mut text = format!(
-        "# Hard cases\n\nMade by `scripts/hard_cases.sh` on {}, {}, commit {}; a software adapter is the GPU. dt 1/60 s, \
-         friction 0.6, sleep off, one thread, unless a row says otherwise; tumble takes the sub-steps of the column (8 of \
-         itself), rapier its default of {RAPIER_SUBSTEPS}. Of chaotic scenes: medians of five seeds, or as the row says. Ratio: \
-         tumble's over rapier's, of the side that does worse. \"A tenth\": no more than a tenth of rapier's error, or \
-         than the row's floor (what counts as none); \"no worse\": by no more than 10 % or the floor. [All numbers](hard_cases.csv).\n",
-        machine.name, machine.date, machine.commit
-    );
+    table.write_record(COLUMNS).map_err(|e| told(&e))?;
+    let mut text = format!("# Hard cases\n\n`scripts/hard_cases.sh` on {machine}, {date}, commit {commit}. {LEAD}\n\n");
+    let mut verdicts: Vec<(&str, usize)> = Vec::new();
+    for row in &rows {
+        match verdicts.iter_mut().find(|(verdict, _)| *verdict == row.verdict()) {
+            Some((_, count)) => *count += 1,
+            None => verdicts.push((row.verdict(), 1)),
+        }
+    }
+    verdicts.sort_by_key(|(_, count)| usize::MAX - count);
+    let verdicts: Vec<String> = verdicts.into_iter().map(|(verdict, count)| format!("{verdict} {count}")).collect();
+    let _ = writeln!(text, "{} rows: {}. [The table as CSV](hard_cases.csv).", rows.len(), verdicts.join(", "));
     for (letter, title) in SECTIONS {
         let _ = writeln!(text, "\n## {title}\n");
-        text.push_str(
-            "| case | quantity | tumble CPU | tumble GPU | rapier | ratio | exact | asked | sub-steps | verdict |\n",
-        );
-        text.push_str("|---|---|---:|---:|---:|---:|---:|---|---:|---|\n");
+        let head =
+            "| case | quantity | tumble CPU | tumble GPU | rapier | ratio | exact | asked | sub-steps | verdict |";
+        let _ = writeln!(text, "{head}\n|---|---|---:|---:|---:|---:|---:|---|---:|---|");
         let mut last = "";
         for row in rows.iter().filter(|row| row.section == letter) {
             let Line { case, quantity, unit, exact, asked, substeps, .. } = &row.first;
-            let none = if exact.is_some() || row.by(By::Rapier).is_none() { "–" } else { "not run" };
             let [cpu, gpu] = By::OURS.map(|by| row.cell(by, "not run"));
-            let rapier = row.cell(By::Rapier, none);
-            let (ratio, exact) = (row.ratio().map(number).unwrap_or_default(), exact.map(number).unwrap_or_default());
-            let name = if case == last { "" } else { case };
-            let (dash, verdict) = (|x: &String| if x.is_empty() { "–".to_owned() } else { x.clone() }, row.verdict());
-            let unit_told = if unit == "1" { String::new() } else { format!(", {unit}") };
-            let _ = writeln!(
-                text,
-                "| {name} | {quantity}{unit_told} | {cpu} | {gpu} | {rapier} | {} | {} | {} | {substeps} | {verdict} |",
-                dash(&ratio),
-                dash(&exact),
-                dash(asked)
-            );
+            let [ratio, exact] = [row.ratio(), *exact].map(|value| value.map(number).unwrap_or_default());
+            let (rapier, verdict) = (row.cell(By::Rapier, ""), row.verdict());
+            let theirs = row.by(By::Rapier).map_or(String::new(), |line| line.substeps.to_string());
+            let known = [title, case, quantity, unit, &cpu, &gpu, &rapier, &ratio, &exact, asked];
+            let rest = [&substeps.to_string(), &theirs, verdict.trim_matches('*'), &machine, &commit, &date];
+            table.write_record(known.into_iter().chain(rest)).map_err(|e| told(&e))?;
+            let named = if case == last { "" } else { case };
+            let quantity = if unit == "1" { quantity.clone() } else { format!("{quantity}, {unit}") };
+            let substeps = if theirs.is_empty() { substeps.to_string() } else { format!("{substeps} / {theirs}") };
+            let cells = [named, &quantity, &cpu, &gpu, &rapier, &ratio, &exact, asked, &substeps, verdict];
+            let _ = writeln!(text, "| {} |", cells.map(|cell| if cell.is_empty() { " " } else { cell }).join(" | "));
             last = case;
-            let (ours, theirs) = (substeps.to_string(), row.by(By::Rapier).map(|l| l.substeps.to_string()));
-            let cells = [title, case, quantity, unit, &cpu, &gpu, &rapier, &exact, asked, &ratio, &ours];
-            let tail = [&theirs.unwrap_or_default(), verdict, &machine.name, &machine.commit, &machine.date];
-            let cells = cells.into_iter().chain(tail).map(|cell| if cell == "–" { "" } else { cell });
-            table.write_record(cells).map_err(|e| told(&e))?;
         }
     }
     table.flush().map_err(|e| told(&e))?;
-    text.push('\n');
-    text.push_str(closing);
-    std::fs::write(out.join("hard_cases.md"), text).map_err(|e| told(&e))
+    std::fs::write(out.join("hard_cases.md"), text + "\n" + closing).map_err(|e| told(&e))
 }
 
 fn read(folder: &Path) -> Result<Vec<Row>, String> {
@@ -222,21 +241,20 @@ impl Row {
         })
     }
 
-    /// The largest of ours: errors are what is set beside rapier's, and a fallen side has the worst. The lowest of times
-    /// for which something stood.
+    /// Numbers of our sides.
     fn ours(&self) -> impl Iterator<Item = f64> {
         self.lines.iter().filter(|line| line.by != By::Rapier).map(|line| line.value)
     }
 
+    /// Of errors, which are better when they are smaller.
     fn ratio(&self) -> Option<f64> {
         let (theirs, _) = (self.by(By::Rapier)?.value, self.first.floor?);
-        let worst = self.ours().map(|ours| ours / theirs).fold(f64::MIN, |a, b| if b.is_nan() { b } else { a.max(b) });
-        worst.is_finite().then_some(worst)
+        let worst = self.ours().map(|ours| ours / theirs).fold(f64::MIN, f64::max);
+        (worst.is_finite() && !self.ours().any(f64::is_nan)).then_some(worst)
     }
 
     fn verdict(&self) -> &'static str {
-        let held = |line: &&Line| line.by != By::Rapier && line.held.is_some();
-        if self.lines.iter().filter(held).count() > 0 {
+        if self.lines.iter().any(|line| line.held.is_some()) {
             let fails = |by| self.by(by).is_some_and(|line| line.held == Some(false));
             return match (fails(By::Cpu), fails(By::Gpu)) {
                 (false, false) => "held",
@@ -248,18 +266,57 @@ impl Row {
         let (Some(theirs), Some(floor)) = (self.by(By::Rapier).map(|line| line.value), self.first.floor) else {
             return "told";
         };
-        // Where rapier's fell, standing is better.
-        let within = |share: f64, more: f64| {
-            self.ours().all(|ours| !ours.is_nan() && (theirs.is_nan() || ours <= (share * theirs).max(more)))
-        };
-        let fell = self.ours().any(f64::is_nan);
+        let within = |limit: f64| self.ours().all(|ours| ours <= limit);
         match () {
-            () if fell && theirs.is_nan() => "both fall",
-            () if fell => "**falls, rapier's stands**",
-            () if within(0.1, floor) => "a tenth",
-            () if within(0.5, floor) => "a half",
-            () if within(1.1, theirs + floor) => "no worse",
+            () if self.ours().any(f64::is_nan) => "**falls**",
+            () if theirs.is_nan() => "rapier's falls",
+            () if within(0.1 * theirs) => "a tenth",
+            () if within(floor) => "none",
+            () if within(theirs) => "better",
+            () if within((1.1 * theirs).max(theirs + floor)) => "no worse",
             () => "**worse**",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(asked: Option<bool>, floor: Option<f64>, values: &[(By, f64)]) -> Row {
+        let line = |&(by, value): &(By, f64)| Line {
+            case: "case".into(),
+            quantity: "quantity".into(),
+            unit: "mm".into(),
+            by,
+            substeps: 8,
+            value,
+            exact: None,
+            asked: String::new(),
+            held: asked.filter(|_| by != By::Rapier),
+            floor,
+        };
+        let lines: Vec<_> = values.iter().map(line).collect();
+        Row { section: 'A', first: lines[0].clone(), lines }
+    }
+
+    /// Oracle: the rules that the table's lead tells.
+    #[test]
+    fn verdicts_follow_their_rules() {
+        let beside = |cpu: f64, gpu: f64, rapier: f64| {
+            let row = row(None, Some(0.1), &[(By::Cpu, cpu), (By::Gpu, gpu), (By::Rapier, rapier)]);
+            (row.verdict(), row.ratio())
+        };
+        assert_eq!(beside(1.0, 0.5, 10.0), ("a tenth", Some(0.1)));
+        assert_eq!(beside(0.05, 0.1, 0.01), ("none", Some(10.0)));
+        assert_eq!(beside(1.0, 5.0, 10.0), ("better", Some(0.5)));
+        assert_eq!(beside(10.0, 11.0, 10.0), ("no worse", Some(1.1)));
+        assert_eq!(beside(0.2, 0.25, 0.15), ("no worse", Some(0.25 / 0.15)));
+        assert_eq!(beside(1.0, 11.5, 10.0), ("**worse**", Some(1.15)));
+        assert_eq!(beside(1.0, f64::NAN, 10.0), ("**falls**", None));
+        assert_eq!(beside(1.0, 1.0, f64::NAN), ("rapier's falls", None));
+        assert_eq!(row(Some(true), None, &[(By::Cpu, 1.0), (By::Rapier, 9.0)]).verdict(), "held");
+        assert_eq!(row(Some(false), None, &[(By::Gpu, 1.0)]).verdict(), "**missed on the GPU**");
+        assert_eq!(row(None, None, &[(By::Cpu, 1.0)]).verdict(), "told");
     }
 }
