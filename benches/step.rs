@@ -7,7 +7,7 @@
 use std::time::Instant;
 use tumble::prelude::*;
 use tumble_bench::engines::RapierWorld;
-use tumble_core::{Penetration, measures, scenes};
+use tumble_core::{Accuracy, Penetration, measures, scenes};
 
 struct Settings {
     warm_up: usize,
@@ -60,7 +60,7 @@ const RAPIER_SUBSTEPS: u32 = 4;
 /// Each engine with its own default number of sub-steps.
 fn compare(name: &str, scene: &Scene, settings: &Settings, gpu: bool) -> Vec<Row> {
     let params = Params { threads: Some(settings.threads), ..Params::default() };
-    let usual = Params { substeps: RAPIER_SUBSTEPS, ..params };
+    let usual = Params { accuracy: Accuracy::Substeps(RAPIER_SUBSTEPS), ..params };
     let mut theirs = RapierWorld::new(scene, &usual, settings.threads);
     let mut ours = tumble::cpu::World::new(scene.clone(), params).expect("the scene is valid");
     let mut ours_gpu = gpu.then(|| World::new(scene.clone(), params, Backend::Gpu).expect("an adapter"));
@@ -145,7 +145,7 @@ fn main() {
     } else {
         Settings { warm_up: 120, rounds: 12, steps_a_round: 10, threads }
     };
-    let ours = Params::default().substeps;
+    let ours = Params::default().accuracy;
     println!(
         "{threads} threads, dt 1/60 s, sub-steps: rapier {RAPIER_SUBSTEPS}, tumble {ours}; {} warm-up steps",
         settings.warm_up

@@ -3,6 +3,7 @@
 //
 //   integrate_velocities   velocities in `solver_bodies`, from `work_states` (forces) and `props`
 //   integrate_positions    translation and delta there
+//   rewind                 translation and delta of what nothing moves as at first
 //   first_substep, next_substep, last_substep   both, as one pass wants it
 //   commit                 `states` from `solver_bodies`, `shares` and `work_states`; counts and names bodies in quarantine
 //   write_poses            `poses`, the bodies' own frames for users and renderers, from `states` and `props`
@@ -12,6 +13,7 @@
 
 //#import shared/body.wgsl
 //#import shared/control.wgsl
+//#import shared/level.wgsl
 //#import shared/math.wgsl
 //#import shared/step.wgsl
 //#import shared/thread.wgsl
@@ -43,6 +45,11 @@ fn acceleration(i: u32) -> vec3<f32> {
     return step.gravity * props[i].gravity_scale + work_states[i].force * props[i].inverse_mass;
 }
 
+// Whether body i is one of those of the step's level, or one that nothing pushes, which takes part in all.
+fn takes_part(i: u32) -> bool {
+    return control.stop == 0u && (solver_bodies[i].level == step.level || !moves(work_states[i].flags));
+}
+
 // Gravity, force, torque and damping over one sub-step.
 fn integrate_velocity(i: u32) {
     if !moves(work_states[i].flags) {
@@ -66,7 +73,7 @@ fn integrate_velocities(
     @builtin(local_invocation_index) lid: u32,
 ) {
     let i = invocation(wg, num, lid);
-    if i < step.body_count && control.stop == 0u {
+    if i < step.body_count && takes_part(i) {
         integrate_velocity(i);
     }
 }
@@ -168,8 +175,22 @@ fn integrate_positions(
     @builtin(local_invocation_index) lid: u32,
 ) {
     let i = invocation(wg, num, lid);
-    if i < step.body_count && control.stop == 0u {
+    if i < step.body_count && takes_part(i) {
         integrate_position(i);
+    }
+}
+
+// Back to where bodies that nothing moves began: every level of sub-steps leads them the whole way.
+@compute @workgroup_size(256)
+fn rewind(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i < step.body_count && control.stop == 0u && !moves(work_states[i].flags) {
+        solver_bodies[i].translation = vec3<f32>();
+        solver_bodies[i].delta = vec4<f32>(0.0, 0.0, 0.0, 1.0);
     }
 }
 
@@ -187,7 +208,7 @@ fn first_substep(
     @builtin(local_invocation_index) lid: u32,
 ) {
     let i = invocation(wg, num, lid);
-    if i < step.body_count && control.stop == 0u {
+    if i < step.body_count && takes_part(i) {
         start(i);
     }
 }
@@ -201,7 +222,7 @@ fn next_substep(
     @builtin(local_invocation_index) lid: u32,
 ) {
     let i = invocation(wg, num, lid);
-    if i >= step.body_count || control.stop != 0u {
+    if i >= step.body_count || !takes_part(i) {
         return;
     }
     let linear = solver_bodies[i].linear_velocity - solver_bodies[i].linear_start;
@@ -239,7 +260,7 @@ fn last_substep(
     @builtin(local_invocation_index) lid: u32,
 ) {
     let i = invocation(wg, num, lid);
-    if i < step.body_count && control.stop == 0u {
+    if i < step.body_count && takes_part(i) {
         solver_bodies[i].eigenvalue = ease(i);
         integrate_position(i);
     }
@@ -276,6 +297,7 @@ fn commit(
             state.linear_velocity = body.linear_velocity;
             state.angular_velocity = body.angular_velocity;
             state.eigenvalue = body.eigenvalue;
+            state.h = h_of(step.h, body.level);
         } else {
             state.flags |= BODY_FROZEN;
             state.linear_velocity = vec3<f32>();

@@ -33,10 +33,10 @@ pub use tumble_gpu as gpu;
 
 pub use tumble_core as core;
 pub use tumble_core::{
-    Batching, BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Contact, ContactPoint,
-    Contacts, Editor, Error, GaussSeidel, Inserted, Jacobi, MortonBits, Nearest, NearestQuery, OnePass, Overlap,
-    OverlapShape, Overlaps, Params, Penalty, Pose, Poses, Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene,
-    Shape, Sleep, Soft, Solver, StepReport, Traversal, Velocities, Velocity,
+    Accuracy, Batching, BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Contact,
+    ContactPoint, Contacts, Editor, Error, GaussSeidel, Inserted, Jacobi, MortonBits, Nearest, NearestQuery, OnePass,
+    Overlap, OverlapShape, Overlaps, Params, Penalty, Pose, Poses, Ray, RayHit, Result, RigidBodyBuilder,
+    RigidBodyType, Scene, Shape, Sleep, Soft, Solver, Spent, StepReport, Traversal, Velocities, Velocity,
 };
 pub use world::{Backend, World};
 

@@ -21,7 +21,8 @@ use tumble::World;
 use tumble_core::glam::Vec3;
 use tumble_core::layout::{BATCHES, LAST_BATCH};
 use tumble_core::{
-    BodyHandle, Capacities, ColliderBuilder, Contact, Contacts, Error, Params, RigidBodyBuilder, Scene, Shape, scenes,
+    Accuracy, BodyHandle, Capacities, ColliderBuilder, Contact, Contacts, Error, Params, RigidBodyBuilder, Scene,
+    Shape, scenes,
 };
 use worlds::{SIDES, Side, report, steps};
 
@@ -79,7 +80,7 @@ fn a_column_weighs_what_it_weighs() {
         for substeps in [1, 4, 7] {
             let scene = scenes::column(4);
             let boxes: Vec<_> = scene.bodies().skip(1).collect();
-            let mut world = side.world(&scene, &Params { substeps, ..Params::default() });
+            let mut world = side.world(&scene, &Params { accuracy: Accuracy::Substeps(substeps), ..Params::default() });
             steps(&mut world, 600);
             let contacts = check_form(&mut world);
             assert_eq!(contacts.all.len(), 4);
@@ -121,7 +122,7 @@ fn friction_holds_what_it_must() {
         for (name, scene, body, expected, count) in cases {
             // In later sub-steps the solver's arm on the ball has turned away from the slope, and it pushes less.
             let substeps = if name == "roll" { 1 } else { 4 };
-            let mut world = side.world(scene, &Params { substeps, ..Params::default() });
+            let mut world = side.world(scene, &Params { accuracy: Accuracy::Substeps(substeps), ..Params::default() });
             steps(&mut world, count);
             let contacts = check_form(&mut world);
             let weight = mass(scene, body) * G;
@@ -144,7 +145,7 @@ fn pushes_add_up() {
     let cases = [scenes::bouncing_ball(0.0, 1.0), scenes::bouncing_ball(0.7, 1.0), scenes::slip_to_roll(0.6, 7.0)];
     for side in SIDES {
         for (scene, body) in &cases {
-            let mut world = side.world(scene, &Params { substeps: 1, ..Params::default() });
+            let mut world = side.world(scene, &Params { accuracy: Accuracy::Substeps(1), ..Params::default() });
             let before = world.velocities().unwrap()[*body].linear;
             let mut sum = Vec3::ZERO;
             for _ in 0..100 {
@@ -313,7 +314,7 @@ fn worlds_that_change() {
         let at = RigidBodyBuilder::dynamic().translation(Vec3::new(0.0, 1.5, 0.0));
         let new = world.edit().insert(at, ColliderBuilder::cuboid(0.5, 0.5, 0.5).density(2000.0)).unwrap();
         assert_eq!(new.body.slot(), boxes[1].slot());
-        world.set_params(Params { substeps: 2, dt: 0.01, ..Params::default() }).unwrap();
+        world.set_params(Params { accuracy: Accuracy::Substeps(2), dt: 0.01, ..Params::default() }).unwrap();
         assert_eq!(contacts(&mut world), before);
         assert!(before.all.iter().any(|contact| contact.body_a == boxes[1]));
         steps(&mut world, 400);

@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
 use tumble::core::{measures, scenes};
-use tumble::{Backend, Broadphase, Params, World};
+use tumble::{Accuracy, Backend, Broadphase, Params, World};
 
 const FIELDS: [&str; 21] = [
     "scene",
@@ -102,7 +102,8 @@ fn json_has_the_documented_fields() {
     found.sort_unstable();
     assert_eq!(found, expected);
 
-    let params = Params { dt: 0.01, substeps: 3, broadphase: Broadphase::Grid, ..Params::default() };
+    let params =
+        Params { dt: 0.01, accuracy: Accuracy::Substeps(3), broadphase: Broadphase::Grid, ..Params::default() };
     let mut world = World::new(scenes::pile(50), params, Backend::Cpu).unwrap();
     for _ in 0..90 {
         world.step().unwrap();
@@ -205,10 +206,14 @@ fn bad_arguments_are_refused_in_one_line() {
 #[test]
 fn limits_agree_with_the_library() {
     for (substeps, threads) in [(1, 1), (256, 1024)] {
-        Params { substeps, threads: Some(threads), ..Params::default() }.validate().unwrap();
+        Params { accuracy: Accuracy::Substeps(substeps), threads: Some(threads), ..Params::default() }
+            .validate()
+            .unwrap();
     }
     for (substeps, threads) in [(0, 1), (257, 1), (1, 0), (1, 1025)] {
-        Params { substeps, threads: Some(threads), ..Params::default() }.validate().unwrap_err();
+        Params { accuracy: Accuracy::Substeps(substeps), threads: Some(threads), ..Params::default() }
+            .validate()
+            .unwrap_err();
     }
 }
 

@@ -9,7 +9,7 @@ mod common;
 use beside::{Any, SUBSTEPS, ours, substeps};
 use tumble::prelude::*;
 use tumble_bench::hard_cases::{Ask, By, Case};
-use tumble_core::{measures, scenes};
+use tumble_core::{Accuracy, measures, scenes};
 
 fn run(world: &mut World, steps: usize) {
     for _ in 0..steps {
@@ -173,7 +173,8 @@ fn odd_parameters_stay_finite() {
                     measures::kinetic_energy(&scene, poses, velocities) + measures::potential_energy(&scene, poses)
                 };
                 let before = energy(&measures::initial_poses(&scene), &measures::initial_velocities(&scene));
-                let mut world = ours(by, scene.clone(), Params { dt, substeps, ..Params::default() });
+                let mut world =
+                    ours(by, scene.clone(), Params { dt, accuracy: Accuracy::Substeps(substeps), ..Params::default() });
                 let mut gained = 0.0f64;
                 for _ in 0..8 {
                     run(&mut world, 5);

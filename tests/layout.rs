@@ -16,6 +16,7 @@ const LAYOUTS: &[&str] = &[
     "shared/constraint",
     "shared/control",
     "shared/edit",
+    "shared/level",
     "shared/manifold",
     "shared/pair",
     "shared/query",
@@ -67,7 +68,7 @@ fn rust_field(owner: &str, field: &str, offset: usize, bytes: usize, type_name: 
 fn rust_layouts() -> BTreeMap<&'static str, Layout> {
     BTreeMap::from_iter(layouts! {
         BodyState {
-            position, flags, rotation, linear_velocity, generation, angular_velocity, pad_a, force, pad_b, torque,
+            position, flags, rotation, linear_velocity, generation, angular_velocity, credit, force, h, torque,
             eigenvalue
         }
         BodyProps {
@@ -77,7 +78,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         Rest { position, time, rotation, island, pad_a, pad_b, pad_c }
         SolverBody {
             linear_velocity, inverse_mass, angular_velocity, touched, translation, eigenvalue, delta,
-            inverse_inertia_diagonal, pad_b, inverse_inertia_off, pad_c, linear_start, weight, angular_start, weighted
+            inverse_inertia_diagonal, level, inverse_inertia_off, pad_c, linear_start, weight, angular_start, weighted
         }
         PoseRecord { translation, tag, rotation }
         Collider { size, shape, position, body, rotation, friction, restitution, combine, born, surface_velocity,
@@ -90,7 +91,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         ConstraintHead {
             normal, friction, body_a, body_b, slot, count, restitution, bias_rate, mass_scale, impulse_scale,
             remembered, round_a, round_b, rolling_resistance, between, twisting_resistance, resisted, rolling_inertia,
-            surface_velocity, twisting_inertia, pad_a
+            surface_velocity, twisting_inertia, level
         }
         ConstraintPoint {
             anchor, adjusted_separation, normal_mass, tangent_mass, approach, deviation, total, pad_b
@@ -102,7 +103,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             new_count, dead_count, constraint_count, point_count, batch_count, rounds, unplaced, last_count,
             large_count, max_degree, solved, turns, cell_class, cell_bits, center_min, inverse_cell, center_max,
             pad_a, batch_start, quarantined, pad_b, islands, islands_open, asleep, islands_asleep,
-            awake, manifolds_asleep, pad_c
+            awake, manifolds_asleep, levels_wanted, levels_used, visits, residual, bodies_over, pad_c
         }
         EditRecord { op, target, kind, generation, data }
         EditRange { first, count }
@@ -119,7 +120,8 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             speculative_distance, restitution_threshold, body_count, collider_count, pair_capacity, cell_table_bits,
             large_limit, edit_ranges, drop_pair, write_poses, batch_rounds, last_limit, wide_batches,
             static_bias_rate, static_mass_scale, static_impulse_scale, memory_gain, memory_limit,
-            memory_band, blow_speed, solver, batching, sleep_distance, sleep_time, wake_all, iterations, slop, pad_a
+            memory_band, blow_speed, solver, batching, sleep_distance, sleep_time, wake_all, iterations, slop,
+            levels, level, tolerance, pad_a
         }
     })
 }
@@ -153,7 +155,8 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
         tree_members as "MEMBERS_" { MOVING, FIXED, LARGE, ALL }
         batching as "BATCHING_" { WRITE_AND_VERIFY, LOWEST_FREE, PERSISTENT, LAW, STATIC_LAST }
         ;
-        BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT, NO_NODE, NO_COLLIDER
+        BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT, NO_NODE, NO_COLLIDER,
+        LEVELS, LEVEL_HOLD, LEVEL_CALM, MOST_CREDIT
     }
 }
 

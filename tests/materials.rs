@@ -26,7 +26,7 @@ impl Rows<'_> {
         let (by, solver) = (if self.side == Side::Cpu { By::Cpu } else { By::Gpu }, self.solver);
         if solver == Solver::default() {
             let ask = Ask::Near(exact.into(), within.into());
-            self.case.row(by, Params::default().substeps, quantity, unit, measured.into(), ask);
+            self.case.row(by, Params::default().accuracy.most(), quantity, unit, measured.into(), ask);
         } else {
             println!("{quantity:<44} {by:?}, {solver}: {measured:>10.5}  exact {exact:>10.5}  within {within:.0e}");
         }

@@ -138,7 +138,7 @@ fn the_result_becomes_the_state() {
             let mut counters: Vec<u32> = bytemuck::cast_slice(&[stage.control]).to_vec();
             let mut states = Vec::new();
             for (i, (body, state)) in stage.bodies.iter().zip(&stage.frame.states).enumerate() {
-                let (state, bad) = motion::commit(body, state, shares[i]);
+                let (state, bad) = motion::commit(body, state, shares[i], &stage.frame.step);
                 let frozen = state.flags & body_flags::FROZEN != 0 && state.flags & body_flags::KIND != 0;
                 counters[FROZEN_COUNT] += u32::from(frozen);
                 if bad {

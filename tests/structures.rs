@@ -8,37 +8,48 @@ mod beside;
 mod common;
 
 use beside::{
-    Any, DEEPEST, DRIFT, FASTEST, Held, Plan, SINK, SUBSTEPS, all_hold, compare, params, run, substeps, told,
+    Any, DEEPEST, DRIFT, FASTEST, Held, ON_DEMAND, Plan, SINK, SUBSTEPS, USUAL, all_hold, compare, params, run,
+    substeps, told,
 };
 use tumble::prelude::*;
 use tumble_bench::hard_cases::{Ask, By, Case};
-use tumble_core::scenes;
+use tumble_core::{Accuracy, scenes};
 
 /// It is watched for 10 s. What must stand lies no deeper than rapier's, where that stands too, or than 0.1 mm.
-fn watch(row: &str, name: &str, scene: Scene, substeps: u32, limit: f64, stands: bool) -> Vec<String> {
+fn watch(row: &str, name: &str, scene: Scene, accuracy: Accuracy, limit: f64, stands: bool) -> Vec<String> {
     let scenes = [scene];
-    let plan = Plan { scenes: &scenes, params: params(substeps), steps: 600, limit, by: &By::ALL, stands };
+    let plan = Plan { scenes: &scenes, params: params(accuracy), steps: 600, limit, by: &By::ALL, stands };
     let held = [told(SINK), told(DRIFT), Held(DEEPEST, 1.0, 0.1), told(FASTEST)];
-    compare(&Case::new(row, &format!("{name}, {substeps} sub-steps, 10 s")), &plan, &held)
+    compare(&Case::new(row, &format!("{name}, {accuracy}, 10 s")), &plan, &held)
 }
 
 /// Two levels stand at the usual 8 sub-steps, three with 16. Five stand in rapier; here they fall with 24, and with 32 on
 /// one side.
 #[test]
 fn a_card_house_stands() {
-    let house = |levels: usize, substeps, stands| {
-        watch("B06", &format!("card house of {levels} levels"), scenes::card_house(levels), substeps, 0.1, stands)
+    let house = |levels: usize, accuracy, stands| {
+        watch("B06", &format!("card house of {levels} levels"), scenes::card_house(levels), accuracy, 0.1, stands)
     };
-    all_hold([house(2, SUBSTEPS, true), house(3, 16, true), house(5, SUBSTEPS, false)]);
+    all_hold([
+        house(2, USUAL, true),
+        house(3, Accuracy::Substeps(16), true),
+        house(5, USUAL, false),
+        house(5, ON_DEMAND, false),
+    ]);
 }
 
 /// Ten layers stand at the usual 8 sub-steps. Thirty do in rapier, 9 cm lower; here they fall, and stand with 12 and more.
 #[test]
 fn jenga_stands() {
-    let tower = |layers: usize, substeps, stands| {
-        watch("B07", &format!("Jenga, {layers} layers"), scenes::jenga(layers), substeps, 0.2, stands)
+    let tower = |layers: usize, accuracy, stands| {
+        watch("B07", &format!("Jenga, {layers} layers"), scenes::jenga(layers), accuracy, 0.2, stands)
     };
-    all_hold([tower(10, SUBSTEPS, true), tower(30, SUBSTEPS, false), tower(30, 16, true)]);
+    all_hold([
+        tower(10, USUAL, true),
+        tower(30, USUAL, false),
+        tower(30, Accuracy::Substeps(16), true),
+        tower(30, ON_DEMAND, false),
+    ]);
 }
 
 /// Oracle: each domino hits the next, so that the last but one lies on the last, or beyond where it stood: some body has
@@ -49,7 +60,7 @@ fn dominoes_fall_to_the_last() {
     let case = Case::new("B08", "30 dominoes, 4 s");
     for by in By::ALL {
         let n = substeps(by, SUBSTEPS);
-        let end = run(&scene, by, params(SUBSTEPS), 240, f64::INFINITY);
+        let end = run(&scene, by, params(USUAL), 240, f64::INFINITY);
         assert!(case.row(by, n, "sink of one that fell", "mm", end.sink, Ask::AtLeast(19.0)), "{by:?}: {end:?}");
         case.row(by, n, "deepest overlap", "mm", end.deepest, Ask::Beside(0.1));
         case.row(by, n, "fastest body", "mm/s", end.fastest, Ask::Beside(1.0));
@@ -60,7 +71,7 @@ fn dominoes_fall_to_the_last() {
 
 /// How far the last body has turned from upright, rad.
 fn last_lean(scene: &Scene, by: By) -> f64 {
-    let mut world = Any::new(by, scene, params(SUBSTEPS));
+    let mut world = Any::new(by, scene, params(USUAL));
     world.steps(240);
     let last = scene.bodies().last().expect("a domino");
     f64::from((world.state().0[last].rotation * Vec3::Y).dot(Vec3::Y)).acos()
@@ -69,5 +80,8 @@ fn last_lean(scene: &Scene, by: By) -> f64 {
 /// What stands nowhere: planks of 8 mm, less than half the distance at which contacts are kept. Said, not asserted.
 #[test]
 fn planks_are_told() {
-    all_hold([watch("B09", "Kapla tower, 10 layers", scenes::plank_tower(10), SUBSTEPS, 0.04, false)]);
+    all_hold(
+        [USUAL, ON_DEMAND]
+            .map(|accuracy| watch("B09", "Kapla tower, 10 layers", scenes::plank_tower(10), accuracy, 0.04, false)),
+    );
 }

@@ -9,6 +9,7 @@ mod grab;
 
 use clock::{Clock, MOST_STEPS};
 use grab::Grab;
+use tumble::Accuracy;
 use tumble::prelude::*;
 
 const DT: f64 = 1.0 / 60.0;
@@ -91,7 +92,7 @@ fn a_spring_brings_any_mass_to_the_cursor() {
                 continue;
             }
             for (dt, substeps) in [(1.0 / 60.0, 4), (1.0 / 240.0, 1), (1.0 / 20.0, 4)] {
-                let params = Params { dt, substeps, ..Params::default() };
+                let params = Params { dt, accuracy: Accuracy::Substeps(substeps), ..Params::default() };
                 let way = Vec3::new(1.0, 0.5, 0.0);
                 let course = course(collider.clone(), offset, way, params, (1.5 / dt).round() as usize);
                 let most = course.iter().fold(0.0, |most: f32, (share, _)| most.max(*share));
@@ -110,7 +111,7 @@ fn a_spring_brings_any_mass_to_the_cursor() {
 /// In the limit of short steps it goes as x = (1 + w t) e^(-w t), w = 20 rad/s.
 #[test]
 fn the_spring_is_critically_damped() {
-    let params = Params { dt: 2e-4, substeps: 1, ..Params::default() };
+    let params = Params { dt: 2e-4, accuracy: Accuracy::Substeps(1), ..Params::default() };
     let (_, collider) = bodies()[1].clone();
     let course = course(collider, Vec3::ZERO, Vec3::new(0.2, 0.0, 0.0), params, 1500);
     let mut worst = 0.0f32;

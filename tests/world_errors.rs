@@ -8,7 +8,7 @@ mod worlds;
 
 use std::process::Command;
 
-use tumble::{Backend, World};
+use tumble::{Accuracy, Backend, World};
 use tumble_core::glam::{Quat, Vec3};
 use tumble_core::{
     Capacities, ColliderBuilder, Error, OnePass, Params, Pose, Result, RigidBodyBuilder, Scene, Soft, Solver, scenes,
@@ -37,7 +37,7 @@ fn bad_params() -> Vec<(Params, &'static str)> {
     let one = |law| Params { solver: Solver::OnePass(law), ..good };
     let soft = |law| Params { solver: Solver::Soft(law), ..good };
     let mut cases = vec![
-        (Params { substeps: 0, ..good }, "substeps"),
+        (Params { accuracy: Accuracy::Substeps(0), ..good }, "substeps"),
         (Params { threads: Some(0), ..good }, "threads"),
         (Params { capacities: Capacities { pairs: Some(0), ..room }, ..good }, "capacities.pairs"),
         (Params { capacities: Capacities { pairs: Some(1 << 26), ..room }, ..good }, "capacities.pairs"),

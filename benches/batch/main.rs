@@ -13,7 +13,7 @@
 mod raw;
 
 use std::fmt::Write;
-use tumble::{Batching, OnePass, Params, Scene, Soft, Solver, World, cpu, gpu};
+use tumble::{Accuracy, Batching, OnePass, Params, Scene, Soft, Solver, World, cpu, gpu};
 use tumble_bench::cases;
 use tumble_bench::run::quantile;
 use tumble_core::scenes;
@@ -231,7 +231,7 @@ fn raw(name: &str, scene: &Scene, settings: &Settings) -> Vec<Row> {
 
 /// What a way leaves of a case, on the CPU.
 fn errors(case: &cases::Case, solver: Solver, substeps: u32, quick: bool) -> Vec<Row> {
-    let params = Params { solver, substeps, ..Params::default() };
+    let params = Params { solver, accuracy: Accuracy::Substeps(substeps), ..Params::default() };
     let name = format!("{}, {solver}, {substeps} sub-steps", case.name);
     let steps = if quick { 2 } else { (case.seconds / f64::from(params.dt)).round() as usize };
     println!("{name}, cpu, errors after {steps} steps, mean of {} seeds:", case.seeds);
@@ -242,7 +242,7 @@ fn errors(case: &cases::Case, solver: Solver, substeps: u32, quick: bool) -> Vec
         let mut fell = false;
         for seed in 0..case.seeds {
             let scene = (case.scene)(seed);
-            let params = Params { solver, substeps, ..way.params() };
+            let params = Params { solver, accuracy: Accuracy::Substeps(substeps), ..way.params() };
             let mut world = cpu::World::new(scene.clone(), params).expect("the scene is valid");
             (0..steps).for_each(|_| world.step().expect("step"));
             let poses = world.poses().expect("poses");
@@ -287,7 +287,8 @@ fn main() {
     };
     let device = (!has("--no-gpu")).then(|| gpu::Gpu::any().expect("an adapter"));
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
-    let Params { solver, substeps, .. } = Params::default();
+    let Params { solver, accuracy, .. } = Params::default();
+    let substeps = accuracy.fewest();
     println!(
         "{threads} threads, dt 1/60 s, {substeps} sub-steps, {solver}, {} warm-up steps; ratios are to the default's",
         settings.warm_up

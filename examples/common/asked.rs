@@ -3,7 +3,7 @@
 use clap::builder::PossibleValuesParser;
 use clap::{Parser, ValueEnum};
 use tumble::core::scenes::{self, StandardScene};
-use tumble::{Backend, Broadphase, Error, Params};
+use tumble::{Accuracy, Backend, Broadphase, Error, Params};
 
 const MOST_BODIES: u32 = 5_000_000;
 /// What the process holds at most for each body, as seen with 100,000 of them: on the CPU side, contacts included, and
@@ -47,9 +47,12 @@ pub(crate) struct Asked {
     /// Length of a step in seconds [default: 1/60]
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     dt: Option<f32>,
-    /// Sub-steps a step [default: 4]
+    /// Sub-steps a step; with --tolerance, the most that an island may take: a multiple of 8 [default: 8, or 32]
     #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 256), allow_hyphen_values = true)]
     substeps: Option<u32>,
+    /// Overlap that may be left, in metres: each island takes the sub-steps that it needs [default: all take the same]
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    tolerance: Option<f32>,
     /// Threads of the CPU side [default: one a core]
     #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1024), allow_hyphen_values = true)]
     threads: Option<u32>,
@@ -80,7 +83,7 @@ impl Asked {
     pub(crate) fn params(&self) -> Result<Params, Failure> {
         let mut params = Params { profile: self.profile, ..Params::default() };
         params.dt = self.dt.unwrap_or(params.dt);
-        params.substeps = self.substeps.unwrap_or(params.substeps);
+        params.accuracy = self.accuracy().unwrap_or(params.accuracy);
         params.threads = self.threads.map(|n| n as usize);
         params.broadphase = match self.broadphase {
             BroadphaseName::Auto => Broadphase::Auto,
@@ -92,6 +95,13 @@ impl Asked {
         };
         params.validate()?;
         Ok(params)
+    }
+
+    fn accuracy(&self) -> Option<Accuracy> {
+        match self.tolerance {
+            Some(penetration) => Some(Accuracy::Tolerance { penetration, most: self.substeps.unwrap_or(32) }),
+            None => self.substeps.map(Accuracy::Substeps),
+        }
     }
 
     pub(crate) fn backend(&self) -> Backend {

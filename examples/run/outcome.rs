@@ -85,7 +85,14 @@ impl Outcome {
             "bodies": self.bodies,
             "steps": self.steps,
             "dt": self.params.dt,
-            "substeps": self.params.substeps,
+            "accuracy": self.params.accuracy.to_string(),
+            "substeps": self.params.accuracy.most(),
+            "spent": report.accuracy.map(|spent| json!({
+                "substeps": spent.substeps,
+                "visits": spent.visits,
+                "residual_m": spent.residual_m,
+                "bodies_over": spent.bodies_over,
+            })),
             "ms_per_step": {
                 "median": quantile(&self.milliseconds, 0.5),
                 "p95": quantile(&self.milliseconds, 0.95),
@@ -116,7 +123,12 @@ impl Outcome {
         row("scene", self.scene.into());
         row("backend", format!("{} ({})", report.backend, report.adapter));
         row("bodies", format!("{} dynamic, {} others", self.bodies, self.others));
-        row("steps", format!("{} of {} s, {} sub-steps each", self.steps, params.dt, params.substeps));
+        row("steps", format!("{} of {} s, {}", self.steps, params.dt, params.accuracy));
+        if let Some(spent) = report.accuracy {
+            let each = f64::from(spent.visits) / f64::from(report.manifolds.max(1));
+            row("spent", format!("{each:.1} sub-steps on the mean, {} at most", spent.substeps));
+            row("left", format!("{:.3} mm, {} bodies over", 1e3 * spent.residual_m, spent.bodies_over));
+        }
         row("ms a step", {
             format!("median {:.3}, p95 {:.3}", quantile(&self.milliseconds, 0.5), quantile(&self.milliseconds, 0.95))
         });

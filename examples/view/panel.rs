@@ -154,7 +154,7 @@ fn switches(ui: &mut Ui, facts: &Facts, actions: &mut Vec<Action>) {
             }
         }
     });
-    let mut substeps = facts.params.substeps;
+    let mut substeps = facts.params.accuracy.most();
     let most = substeps.max(16);
     if ui.add(Slider::new(&mut substeps, 1..=most).text("sub-steps")).changed() {
         actions.push(Action::Substeps(substeps));

@@ -260,7 +260,10 @@ impl Viewer {
                 log.tell(|| json!({"event": "colors", "by": format!("{coloring:?}").to_lowercase()}));
             }
             Action::Substeps(substeps) => {
-                let params = tumble::Params { substeps, ..*self.simulation.world.params() };
+                let params = tumble::Params {
+                    accuracy: tumble::Accuracy::Substeps(substeps),
+                    ..*self.simulation.world.params()
+                };
                 self.set_params(params);
             }
             Action::Profile(profile) => {

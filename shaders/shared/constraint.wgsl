@@ -21,7 +21,7 @@ struct ConstraintHead {
     rolling_inertia: f32,
     surface_velocity: vec2<f32>,
     twisting_inertia: f32,
-    pad_a: u32,
+    level: u32,
 }
 
 struct ConstraintPoint {

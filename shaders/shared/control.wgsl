@@ -52,6 +52,11 @@ const CONTROL_ASLEEP: u32 = 114u;
 const CONTROL_ISLANDS_ASLEEP: u32 = 115u;
 const CONTROL_AWAKE: u32 = 116u;
 const CONTROL_MANIFOLDS_ASLEEP: u32 = 117u;
+const CONTROL_LEVELS_WANTED: u32 = 118u;
+const CONTROL_LEVELS_USED: u32 = 119u;
+const CONTROL_VISITS: u32 = 120u;
+const CONTROL_RESIDUAL: u32 = 121u;
+const CONTROL_BODIES_OVER: u32 = 122u;
 
 struct Control {
     stop: u32,
@@ -91,5 +96,10 @@ struct Control {
     islands_asleep: u32,
     awake: u32,
     manifolds_asleep: u32,
-    pad_c: vec2<u32>,
+    levels_wanted: u32,
+    levels_used: u32,
+    visits: u32,
+    residual: u32,
+    bodies_over: u32,
+    pad_c: u32,
 }

@@ -51,5 +51,8 @@ struct StepParams {
     wake_all: u32,
     iterations: u32,
     slop: f32,
-    pad_a: u32,
+    levels: u32,
+    level: u32,
+    tolerance: f32,
+    pad_a: vec2<u32>,
 }

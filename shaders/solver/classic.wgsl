@@ -180,7 +180,9 @@ fn tail(kind: u32, lid: u32) {
             continue;
         }
         for (var c = start_of(index) + local; c < end; c += WORKGROUP) {
-            visit_any(kind, c);
+            if is_of_level(c) {
+                visit_any(kind, c);
+            }
         }
         storageBarrier();
     }
@@ -189,7 +191,9 @@ fn tail(kind: u32, lid: u32) {
     for (var turn = 0u; turn < (end - first + TURN - 1u) / TURN; turn++) {
         if local == turn % WORKGROUP {
             for (var c = first + turn * TURN; c < min(first + (turn + 1u) * TURN, end); c++) {
-                visit_any(kind, c);
+                if is_of_level(c) {
+                    visit_any(kind, c);
+                }
             }
         }
         storageBarrier();
@@ -287,7 +291,7 @@ fn begin(
     @builtin(local_invocation_index) lid: u32,
 ) {
     let i = invocation(wg, num, lid);
-    if i < step.body_count && control.stop == 0u {
+    if i < step.body_count && control.stop == 0u && solver_bodies[i].level == step.level {
         solver_bodies[i].linear_start = solver_bodies[i].linear_velocity;
         solver_bodies[i].angular_start = solver_bodies[i].angular_velocity;
     }
@@ -300,7 +304,7 @@ fn settle(
     @builtin(local_invocation_index) lid: u32,
 ) {
     let i = invocation(wg, num, lid);
-    if i < step.body_count && control.stop == 0u {
+    if i < step.body_count && control.stop == 0u && solver_bodies[i].level == step.level {
         solver_bodies[i].linear_velocity = solver_bodies[i].linear_start;
         solver_bodies[i].angular_velocity = solver_bodies[i].angular_start;
     }

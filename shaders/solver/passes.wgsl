@@ -300,7 +300,9 @@ fn tail(kind: u32, lid: u32) {
             continue;
         }
         for (var c = start_of(index) + local; c < end; c += WORKGROUP) {
-            visit_any(kind, c);
+            if is_of_level(c) {
+                visit_any(kind, c);
+            }
         }
         storageBarrier();
     }
@@ -309,7 +311,9 @@ fn tail(kind: u32, lid: u32) {
     for (var turn = 0u; turn < (end - first + TURN - 1u) / TURN; turn++) {
         if local == turn % WORKGROUP {
             for (var c = first + turn * TURN; c < min(first + (turn + 1u) * TURN, end); c++) {
-                visit_any(kind, c);
+                if is_of_level(c) {
+                    visit_any(kind, c);
+                }
             }
         }
         storageBarrier();

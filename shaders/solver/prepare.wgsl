@@ -12,6 +12,7 @@
 //#import shared/collider.wgsl
 //#import shared/constraint.wgsl
 //#import shared/control.wgsl
+//#import shared/level.wgsl
 //#import shared/manifold.wgsl
 //#import shared/math.wgsl
 //#import shared/pair.wgsl
@@ -45,6 +46,7 @@ fn prepare_body(i: u32) -> SolverBody {
     body.angular_velocity = work_states[i].angular_velocity;
     body.touched = select(0u, 1u, (masks[2u * i] | masks[2u * i + 1u]) != 0u);
     body.eigenvalue = work_states[i].eigenvalue;
+    body.level = level_of(step.levels, work_states[i].credit);
     body.delta = vec4<f32>(0.0, 0.0, 0.0, 1.0);
     if moves(work_states[i].flags) {
         body.inverse_mass = props[i].inverse_mass;
@@ -119,6 +121,15 @@ fn inverse(x: f32) -> f32 {
         return 1.0 / x;
     }
     return 0.0;
+}
+
+// Length of this step's sub-steps over that of those that the impulses between two bodies are from.
+fn scale_of(body_a: u32, body_b: u32, h: f32) -> f32 {
+    let was = max(work_states[body_a].h, work_states[body_b].h);
+    if was == h || was == 0.0 {
+        return 1.0;
+    }
+    return h / was;
 }
 
 // Part of an arm that does not turn with its body: from the centre of a ball to midway between the surfaces, m.
@@ -212,12 +223,15 @@ fn constraints(
         colliders[pair.a].restitution,
         colliders[pair.b].restitution,
     );
+    head.level = select(b.level, a.level, a.inverse_mass > 0.0);
+    // Until `carry`, which has no room for the states.
+    head.remembered = scale_of(body_a, body_b, h_of(step.h, head.level));
     if a.inverse_mass > 0.0 && b.inverse_mass > 0.0 {
-        head.bias_rate = step.bias_rate;
+        head.bias_rate = step.bias_rate * f32(1u << head.level);
         head.mass_scale = step.mass_scale;
         head.impulse_scale = step.impulse_scale;
     } else {
-        head.bias_rate = step.static_bias_rate;
+        head.bias_rate = step.static_bias_rate * f32(1u << head.level);
         head.mass_scale = step.static_mass_scale;
         head.impulse_scale = step.static_impulse_scale;
     }
@@ -266,15 +280,18 @@ fn carry(
         slot_impulses[first + 2u].feature,
         slot_impulses[first + 3u].feature,
     );
+    let scale = heads[c].remembered;
+    var remembered = 0.0;
     if !fresh && stored.x != NO_FEATURE {
         let slot = next_pairs[index].slot;
-        heads[c].remembered = slot_memory[slot].remembered / f32(manifolds[index].count);
+        remembered = scale * (slot_memory[slot].remembered / f32(manifolds[index].count));
         // Solvers that do not resist must not go on with what others left.
         if step.solver <= SOLVER_SOFT {
             let resisted = slot_memory[slot].resisted;
-            heads[c].resisted = vec3<f32>(resisted[0], resisted[1], resisted[2]);
+            heads[c].resisted = scale * vec3<f32>(resisted[0], resisted[1], resisted[2]);
         }
     }
+    heads[c].remembered = remembered;
     for (var i = 0u; i < min(manifolds[index].count, 4u); i++) {
         var impulse: Impulse;
         impulse.feature = manifolds[index].features[i];
@@ -282,8 +299,10 @@ fn carry(
         if !fresh && any(same) {
             // The last that is the same, though no two should be.
             let k = select(select(select(0u, 1u, same.y), 2u, same.z), 3u, same.w);
-            impulse = slot_impulses[first + k];
-            points[4u * c + i].deviation = slot_memory[next_pairs[index].slot].deviations[k];
+            let kept = slot_impulses[first + k];
+            impulse.normal = scale * kept.normal;
+            impulse.tangent = array<f32, 2>(scale * kept.tangent[0], scale * kept.tangent[1]);
+            points[4u * c + i].deviation = scale * slot_memory[next_pairs[index].slot].deviations[k];
         }
         impulses[4u * c + i] = impulse;
     }

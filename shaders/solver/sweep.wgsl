@@ -41,5 +41,13 @@ fn constraint_of(wg: vec3<u32>, num: vec3<u32>, lid: u32) -> u32 {
         local = reverseBits(lid) >> 26u;
     }
     let c = start_of(batch.index) + workgroup_index(wg, num) * SOLVER_WORKGROUP + local;
-    return select(NONE, c, c < start_of(batch.index + 1u) && control.stop == 0u);
+    if c < start_of(batch.index + 1u) && control.stop == 0u && is_of_level(c) {
+        return c;
+    }
+    return NONE;
+}
+
+// Whether constraint c is one of those that this sweep is for.
+fn is_of_level(c: u32) -> bool {
+    return heads[c].level == step.level;
 }

@@ -5,16 +5,20 @@ use rayon::prelude::*;
 use tumble::prelude::*;
 use tumble_bench::engines::RapierWorld;
 use tumble_bench::hard_cases::{Ask, By, Case, RAPIER_SUBSTEPS};
-use tumble_core::measures;
+use tumble_core::{Accuracy, measures};
 
 use crate::common;
 
 /// tumble's default.
 pub(crate) const SUBSTEPS: u32 = 8;
+/// The default, by its name.
+pub(crate) const USUAL: Accuracy = Accuracy::Substeps(SUBSTEPS);
+/// As many as each island needs for a tenth of a millimetre, 32 at most.
+pub(crate) const ON_DEMAND: Accuracy = Accuracy::Tolerance { penetration: 1e-4, most: 32 };
 
-/// Our side with so many sub-steps, on one thread.
-pub(crate) fn params(substeps: u32) -> Params {
-    Params { threads: Some(1), substeps, ..Params::default() }
+/// Our side with this accuracy, on one thread.
+pub(crate) fn params(accuracy: Accuracy) -> Params {
+    Params { threads: Some(1), accuracy, ..Params::default() }
 }
 
 /// A scene on our side of this name.
@@ -34,7 +38,7 @@ pub(crate) enum Any {
 impl Any {
     pub(crate) fn new(by: By, scene: &Scene, params: Params) -> Self {
         if by == By::Rapier {
-            let usual = Params { substeps: RAPIER_SUBSTEPS, ..params };
+            let usual = Params { accuracy: Accuracy::Substeps(RAPIER_SUBSTEPS), ..params };
             return Self::Rapier(Box::new(RapierWorld::new(scene, &usual, 1)));
         }
         Self::Ours(ours(by, scene.clone(), params))
@@ -190,7 +194,7 @@ pub(crate) fn compare(case: &Case, plan: &Plan, held: &[Held]) -> Vec<String> {
         values.sort_by(f64::total_cmp);
         values[values.len() / 2]
     };
-    let n = |by| substeps(by, plan.params.substeps);
+    let n = |by| substeps(by, plan.params.accuracy.most());
     let mut missed = Vec::new();
     if plan.limit.is_finite() {
         let time = plan.steps as f64 / 60.0;

@@ -7,7 +7,7 @@ use tumble_core::{PackedScene, Params, Scene, Solver, limits, scenes};
 use tumble_cpu::batch::{self, Batches, Ends};
 use tumble_cpu::broadphase::{Boxes, brute_force};
 use tumble_cpu::contact::{self, Matched, NO_FEATURE};
-use tumble_cpu::solver::prepare::{Contact, prepare_body, prepare_constraint};
+use tumble_cpu::solver::prepare::{Contact, prepare_body, prepare_constraint, scale};
 use tumble_cpu::solver::{Bodies, PlainRows, solve_plain, store};
 use tumble_cpu::{bounds, continuous, motion, narrowphase};
 
@@ -150,7 +150,7 @@ impl Cpu {
 
     pub(crate) fn bodies(&self, frame: &Frame) -> Vec<SolverBody> {
         let bodies = frame.states.iter().zip(&self.props).zip(&frame.batches.masks);
-        bodies.map(|((state, props), mask)| prepare_body(state, props, *mask)).collect()
+        bodies.map(|((state, props), mask)| prepare_body(state, props, *mask, &frame.step)).collect()
     }
 
     pub(crate) fn rows(&self, frame: &Frame, bodies: &[SolverBody]) -> PlainRows {
@@ -165,7 +165,8 @@ impl Cpu {
         let pair = &frame.matched.pairs[index];
         let stored = &self.impulses[4 * pair.slot as usize..][..4];
         let memory = &self.memory[pair.slot as usize];
-        Contact { pair, manifold: &frame.manifolds[index], stored, memory }
+        let [a, b] = [pair.a, pair.b].map(|c| &frame.states[self.colliders[c as usize].body as usize]);
+        Contact { pair, manifold: &frame.manifolds[index], stored, memory, scale: scale(a, b, frame.step.h) }
     }
 
     /// Impulses by slot as they are after `rows` were solved; slots without a constraint stay as they are.
@@ -221,7 +222,7 @@ impl Cpu {
         self.memory = self.remembered(frame, &rows);
         let shares = self.shares(frame, &bodies);
         let ends = bodies.iter().zip(&frame.states).zip(&shares);
-        self.states = ends.map(|((body, state), share)| motion::commit(body, state, *share).0).collect();
+        self.states = ends.map(|((body, state), share)| motion::commit(body, state, *share, &frame.step).0).collect();
         self.pairs = frame.matched.pairs.clone();
         self.number += 1;
     }

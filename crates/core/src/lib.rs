@@ -4,6 +4,7 @@
 //! Data flows one way: [`Scene`] (builders, handles) → [`PackedScene`] (flat arrays) → a backend's buffers →
 //! [`StepReport`] and poses.
 
+mod accuracy;
 mod builder;
 mod choice;
 pub mod contacts;
@@ -29,6 +30,7 @@ pub mod stopwatch;
 pub mod validate;
 pub mod wear;
 
+pub use accuracy::{Accuracy, Spent, WantedLevels};
 pub use builder::{ColliderBuilder, CombineRule, RigidBodyBuilder, RigidBodyType};
 pub use choice::Spread;
 pub use contacts::{Contact, ContactPoint, Contacts};

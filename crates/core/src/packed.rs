@@ -3,7 +3,7 @@
 use crate::builder::RigidBodyType;
 use crate::error::Result;
 use crate::handle::BodyHandle;
-use crate::layout::{BodyProps, BodyState, Collider, body_flags, shape_kind};
+use crate::layout::{BodyProps, BodyState, Collider, MOST_CREDIT, body_flags, shape_kind};
 use crate::mass::MassProperties;
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -79,6 +79,7 @@ pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<PackedBody> {
         linear_velocity: if builder.body_type == RigidBodyType::Fixed { [0.0; 3] } else { builder.linvel.to_array() },
         generation: body.generation(),
         angular_velocity: if builder.body_type == RigidBodyType::Fixed { [0.0; 3] } else { builder.angvel.to_array() },
+        credit: MOST_CREDIT,
         ..BodyState::zeroed()
     };
     let inverse = |x: f32| if x > 0.0 { 1.0 / x } else { 0.0 };

@@ -1,5 +1,6 @@
 //! What the user may set, with units and defaults.
 
+use crate::accuracy::Accuracy;
 use crate::error::{Result, check};
 use crate::layout::{StepParams, batching};
 use crate::limits::{BYTES_A_PAIR, LAST_LIMIT, batch_rounds};
@@ -158,9 +159,8 @@ impl Sleep {
 pub struct Params {
     /// Length of a step, s. 1/60 at first.
     pub dt: f32,
-    /// Sub-steps a step: collisions are found once a step, contacts solved once a sub-step. 8 at first: one sweep each,
-    /// they take the time of 4 soft sub-steps.
-    pub substeps: u32,
+    /// How many sub-steps a step takes. 8 at first.
+    pub accuracy: Accuracy,
     /// How contacts are solved.
     pub solver: Solver,
     /// Fastest speed at which overlap is undone, m/s. 0.5 at first: chains of overlaps add up, and 64 boxes that overlap
@@ -196,7 +196,7 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             dt: 1.0 / 60.0,
-            substeps: 8,
+            accuracy: Accuracy::default(),
             solver: Solver::default(),
             max_push_speed: 0.5,
             speculative_distance: 0.02,
@@ -219,7 +219,7 @@ impl Params {
     pub fn validate(&self) -> Result<()> {
         let what = || "Params".to_string();
         check((1e-6..=1.0).contains(&self.dt), what, "dt", self.dt, "1e-6 to 1 s")?;
-        check((1..=256).contains(&self.substeps), what, "substeps", self.substeps, "1 to 256")?;
+        self.accuracy.validate(what)?;
         self.solver.validate(what)?;
         check((0.0..=1e6).contains(&self.max_push_speed), what, "max_push_speed", self.max_push_speed, "0 to 1e6 m/s")?;
         check(
@@ -257,14 +257,15 @@ impl Params {
 
     /// The part of a step's uniform that follows from the parameters alone.
     pub fn step_params(&self, step: u32, gravity: Vec3) -> StepParams {
-        let h = self.dt / self.substeps as f32;
+        let substeps = self.accuracy.fewest();
+        let h = self.dt / substeps as f32;
         let law = self.solver.law(h);
         let Law { spring: Spring { bias_rate, mass_scale, impulse_scale }, fixed, .. } = law;
         StepParams {
             dt: self.dt,
             h,
             inverse_h: 1.0 / h,
-            substeps: self.substeps,
+            substeps,
             gravity: gravity.to_array(),
             step,
             bias_rate,
@@ -290,6 +291,8 @@ impl Params {
             sleep_distance: self.sleep.map_or(-1.0, |sleep| sleep.distance),
             sleep_time: self.sleep.map_or(f32::MAX, |sleep| sleep.time),
             batching: self.batching_word(),
+            levels: 1,
+            tolerance: self.accuracy.tolerance(),
             ..bytemuck::Zeroable::zeroed()
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::builder::RigidBodyType;
 use crate::layout::pair_kind;
+use crate::params::Params;
 use crate::scene::Scene;
 use crate::shape::Shape;
 use std::fmt;
@@ -17,8 +18,10 @@ pub struct Plan {
     /// Room for balls and cuboids on fixed bodies, which have a tree of their own: their number, rounded up to a power of
     /// two, so that it seldom widens.
     pub fixed: u32,
-    /// Something asks which bodies hang together by contacts: sleep does.
-    pub islands: bool,
+    /// Bodies may sleep.
+    pub sleep: bool,
+    /// Islands have sub-steps of their own.
+    pub levels: bool,
 }
 
 impl Plan {
@@ -45,7 +48,7 @@ impl Plan {
         allow(balls > 0 && halfspaces > 0, pair_kind::BALL_HALFSPACE);
         allow(cuboids > 0 && halfspaces > 0, pair_kind::CUBOID_HALFSPACE);
         let fixed = if fixed > 0 { fixed.next_power_of_two() } else { 0 };
-        Self { pair_kinds, restitution, fixed, islands: false }
+        Self { pair_kinds, restitution, fixed, sleep: false, levels: false }
     }
 
     /// Adds what `other` needs; true when that was anything new.
@@ -54,8 +57,20 @@ impl Plan {
         self.pair_kinds |= other.pair_kinds;
         self.restitution |= other.restitution;
         self.fixed = self.fixed.max(other.fixed);
-        self.islands |= other.islands;
+        self.sleep |= other.sleep;
+        self.levels |= other.levels;
         *self != before
+    }
+
+    /// The plan with what these parameters need.
+    pub fn with(self, params: &Params) -> Self {
+        let levels = self.levels || params.accuracy.is_by_island();
+        Self { sleep: self.sleep || params.sleep.is_some(), levels, ..self }
+    }
+
+    /// Whether something asks which bodies hang together by contacts.
+    pub fn islands(&self) -> bool {
+        self.sleep || self.levels
     }
 
     /// Whether pairs of this kind can occur.
@@ -75,7 +90,7 @@ impl fmt::Display for Plan {
             if kinds.is_empty() { "none".into() } else { kinds.join(", ") },
             self.restitution,
             self.fixed,
-            self.islands
+            self.islands()
         )
     }
 }

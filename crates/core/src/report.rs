@@ -1,6 +1,7 @@
 //! What a step did.
 
-use crate::layout::{Control, QUARANTINE_NAMES};
+use crate::accuracy::Spent;
+use crate::layout::{Control, QUARANTINE_NAMES, StepParams};
 use crate::params::Broadphase;
 use std::fmt;
 
@@ -74,10 +75,13 @@ pub struct StepReport {
     pub lost: u64,
     /// Bodies asleep when the step was done. Their pairs, manifolds and contacts are counted above.
     pub asleep: u32,
-    /// Islands awake, where the world has [`Params::sleep`](crate::Params::sleep); else 0.
+    /// Islands awake, where the world has [`Params::sleep`](crate::Params::sleep) or
+    /// [`Accuracy::Tolerance`](crate::Accuracy::Tolerance); else 0.
     pub islands: u32,
     /// Islands asleep.
     pub islands_asleep: u32,
+    /// What accuracy on demand spent and left; `None` without [`Accuracy::Tolerance`](crate::Accuracy::Tolerance).
+    pub accuracy: Option<Spent>,
     /// Bodies in quarantine, all told.
     pub quarantined: u32,
     /// Slots of bodies newly quarantined in this step, the first few.
@@ -132,6 +136,16 @@ impl StepReport {
         }
     }
 
+    /// What accuracy on demand spent, by the counters and what the step was told.
+    pub fn spent(control: &Control, step: &StepParams) -> Option<Spent> {
+        (step.tolerance >= 0.0).then(|| Spent {
+            substeps: control.levels_used.checked_ilog2().map_or(0, |level| step.substeps << level),
+            visits: control.visits,
+            residual_m: f32::from_bits(control.residual),
+            bodies_over: control.bodies_over,
+        })
+    }
+
     /// Bytes of the broad phase for each body.
     pub fn broadphase_bytes_per_body(&self) -> f64 {
         self.broadphase_bytes as f64 / f64::from(self.bodies.max(1))
@@ -167,6 +181,12 @@ impl fmt::Display for StepReport {
         }
         if self.islands_asleep > 0 {
             write!(f, "; asleep: {} bodies in {} islands", self.asleep, self.islands_asleep)?;
+        }
+        if let Some(Spent { substeps, residual_m, bodies_over, .. }) = self.accuracy {
+            write!(f, "; up to {substeps} sub-steps, {:.3} mm left", 1e3 * residual_m)?;
+            if bodies_over > 0 {
+                write!(f, " ({bodies_over} bodies over the tolerance)")?;
+            }
         }
         for (buffer, n) in &self.growths {
             write!(f, "; `{buffer}` grew {n} times")?;

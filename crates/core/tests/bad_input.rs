@@ -3,8 +3,8 @@
 
 use tumble_core::glam::{Quat, Vec3};
 use tumble_core::{
-    ColliderBuilder, Error, GaussSeidel, Jacobi, OnePass, PackedScene, Params, Penalty, RigidBodyBuilder, Scene, Soft,
-    Solver,
+    Accuracy, ColliderBuilder, Error, GaussSeidel, Jacobi, OnePass, PackedScene, Params, Penalty, RigidBodyBuilder,
+    Scene, Soft, Solver,
 };
 
 const NAN: f32 = f32::NAN;
@@ -178,8 +178,8 @@ fn params() {
     let by = |solver| Params { solver, ..good };
     let capacities = |pairs| tumble_core::Capacities { pairs: Some(pairs), ..good.capacities };
     let mut cases = vec![
-        (Params { substeps: 0, ..good }, "substeps"),
-        (Params { substeps: 257, ..good }, "substeps"),
+        (Params { accuracy: Accuracy::Substeps(0), ..good }, "substeps"),
+        (Params { accuracy: Accuracy::Substeps(257), ..good }, "substeps"),
         (Params { threads: Some(0), ..good }, "threads"),
         (Params { capacities: capacities(0), ..good }, "capacities.pairs"),
     ];

@@ -14,6 +14,7 @@
 use tumble_core::layout::{BATCHES, BodyState, LAST_BATCH, Manifold, Pair, StepParams, UNBATCHED, batching};
 
 use crate::bounds::moves;
+use std::borrow::Cow;
 use tumble_core::limits::{TRIES, VERIFY_ROUNDS, tail_rounds, wide_rounds};
 
 /// What one constraint needs to be placed. `NO_BODY` where nothing moves.
@@ -46,6 +47,28 @@ pub struct Batches {
     pub batch_count: u32,
     /// Most constraints on one body.
     pub max_degree: u32,
+}
+
+/// Some of the constraints of a step, batch by batch, as in [`Batches`].
+pub struct Ordered<'a> {
+    /// Pair of each constraint.
+    pub order: Cow<'a, [u32]>,
+    /// First constraint of each batch, and the end.
+    pub start: Cow<'a, [u32]>,
+}
+
+impl Batches {
+    /// Those whose pair `is_one`, in the same order.
+    pub fn of_level(&self, is_one: impl Fn(u32) -> bool) -> Ordered<'static> {
+        let mut order = Vec::new();
+        let mut start = vec![0];
+        for bounds in self.start.windows(2) {
+            let batch = &self.order[bounds[0] as usize..bounds[1] as usize];
+            order.extend(batch.iter().copied().filter(|&pair| is_one(pair)));
+            start.push(order.len() as u32);
+        }
+        Ordered { order: order.into(), start: start.into() }
+    }
 }
 
 /// A bijection of 26 bits: equal inputs alone collide.

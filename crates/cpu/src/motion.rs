@@ -29,6 +29,14 @@ pub fn integrate_velocity(body: &mut SolverBody, state: &BodyState, props: &Body
     body.angular_velocity = (angular * (1.0 / (1.0 + step.h * props.angular_damping))).to_array();
 }
 
+/// Back to where a body that nothing moves began: every level of sub-steps leads it the whole way.
+pub fn rewind(body: &mut SolverBody, state: &BodyState, _: &BodyProps, _: &StepParams) {
+    if !moves(state.flags) {
+        body.translation = [0.0; 3];
+        body.delta = [0.0, 0.0, 0.0, 1.0];
+    }
+}
+
 /// One pass: velocities before the first sub-step's impulses.
 pub fn first_substep(body: &mut SolverBody, state: &BodyState, props: &BodyProps, step: &StepParams) {
     integrate_velocity(body, state, props, step);
@@ -145,9 +153,9 @@ fn half_turn(w: Vec3, h: f32) -> Quat {
     Quat::from_xyzw(half.x * ratio, half.y * ratio, half.z * ratio, cosine)
 }
 
-/// The state after the step, the body having gone `share` of its way (see `continuous`). A result that is not finite is thrown away: the body keeps its pose and is put in
-/// quarantine. Returns the state and whether that happened.
-pub fn commit(body: &SolverBody, state: &BodyState, share: f32) -> (BodyState, bool) {
+/// The state after the step, the body having gone `share` of its way (see `continuous`). A result that is not finite is
+/// thrown away: the body keeps its pose and is put in quarantine. Returns the state and whether that happened.
+pub fn commit(body: &SolverBody, state: &BodyState, share: f32, step: &StepParams) -> (BodyState, bool) {
     let mut new = *state;
     new.force = [0.0; 3];
     new.torque = [0.0; 3];
@@ -168,6 +176,7 @@ pub fn commit(body: &SolverBody, state: &BodyState, share: f32) -> (BodyState, b
         new.linear_velocity = body.linear_velocity;
         new.angular_velocity = body.angular_velocity;
         new.eigenvalue = body.eigenvalue;
+        new.h = step.h_of(body.level);
     } else {
         new.flags |= body_flags::FROZEN;
         new.linear_velocity = [0.0; 3];

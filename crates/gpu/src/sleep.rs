@@ -1,6 +1,5 @@
 //! Stage `sleep`: who falls asleep and who wakes. Host side of `shaders/sleep.wgsl`.
 
-use crate::island::Island;
 use crate::primitives::{Args, Job};
 use crate::store::{Sizes, word};
 use crate::{Buffers, Gpu, Pass, Pipelines, Recorder};
@@ -19,7 +18,6 @@ pub(crate) struct Sleep {
     rest: Arc<Pass>,
     settle: Arc<Pass>,
     pass_time: Arc<Pass>,
-    island: Island,
     /// One thread an old pair.
     args: Args,
 }
@@ -31,9 +29,8 @@ impl Sleep {
             [pass("begin")?, pass("edited")?, pass("beside")?, pass("wake")?, pass("touch")?];
         let [show, hide, rest, settle, pass_time] =
             [pass("show")?, pass("hide")?, pass("rest")?, pass("settle")?, pass("pass_time")?];
-        let island = Island::new(gpu, pipelines)?;
         let args = Args::new(gpu, pipelines, &[Job::new(word::OLD_PAIR_COUNT, sizes.pairs, 256)])?;
-        Ok(Self { begin, edited, beside, wake, touch, show, hide, rest, settle, pass_time, island, args })
+        Ok(Self { begin, edited, beside, wake, touch, show, hide, rest, settle, pass_time, args })
     }
 
     /// After the edits: who wakes by them.
@@ -52,7 +49,7 @@ impl Sleep {
         Ok(())
     }
 
-    /// After the narrow phase: who wakes by touch, who is left out, and the islands of the others. `a_pair`: arguments for
+    /// After the narrow phase: who wakes by touch, and who is left out. `a_pair`: arguments for
     /// one thread a pair.
     pub(crate) fn record_touch(
         &self,
@@ -64,8 +61,7 @@ impl Sleep {
         recorder.dispatch_indirect(&self.touch, &[], a_pair.0, a_pair.1)?;
         recorder.dispatch(&self.wake, &[], step.body_count.div_ceil(256))?;
         recorder.dispatch(&self.show, &[], step.collider_count.div_ceil(256))?;
-        recorder.dispatch_indirect(&self.hide, &[], a_pair.0, a_pair.1)?;
-        self.island.record(recorder, step, a_pair)
+        recorder.dispatch_indirect(&self.hide, &[], a_pair.0, a_pair.1)
     }
 
     /// After the commit of the states: who falls asleep.

@@ -1,6 +1,6 @@
 //! Stage `solver`: rows, sub-steps, and the way back. Host side of `shaders/solver/`.
 
-use crate::store::{args, index_part};
+use crate::store::{args, index_part, level_part};
 use crate::{Buffers, Gpu, Pass, Pipelines, Recorder};
 use std::sync::Arc;
 use tumble_core::layout::{StepParams, solver};
@@ -17,47 +17,31 @@ struct Sweep {
     tail: Arc<Pass>,
 }
 
+/// A pass over all bodies.
+struct ByBody(Arc<Pass>);
+
+impl ByBody {
+    fn new(gpu: &Gpu, pipelines: &mut Pipelines, stem: &str, entry: &str) -> Result<Self> {
+        Ok(Self(pipelines.pass(gpu, stem, entry)?))
+    }
+
+    fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
+        recorder.dispatch(&self.0, &[level_part(buffers, step)?], by_body(step))
+    }
+}
+
 /// The sub-steps of one solver.
 enum Law {
-    OnePass {
-        first: Arc<Pass>,
-        load: Sweep,
-        pass: Sweep,
-        next: Arc<Pass>,
-        last: Arc<Pass>,
-    },
-    Soft {
-        start: Start,
-        solve: Sweep,
-        positions: Arc<Pass>,
-        relax: Sweep,
-    },
-    GaussSeidel {
-        start: Start,
-        visit: Sweep,
-        last: Sweep,
-        positions: Arc<Pass>,
-    },
-    Jacobi {
-        split: Sweep,
-        start: Start,
-        begin: Arc<Pass>,
-        visit: Sweep,
-        last: Sweep,
-        settle: Arc<Pass>,
-        positions: Arc<Pass>,
-    },
-    Penalty {
-        first: Arc<Pass>,
-        press: Sweep,
-        settle: Arc<Pass>,
-        positions: Arc<Pass>,
-    },
+    OnePass { first: ByBody, load: Sweep, pass: Sweep, next: ByBody, last: ByBody },
+    Soft { start: Start, solve: Sweep, positions: ByBody, relax: Sweep },
+    GaussSeidel { start: Start, visit: Sweep, last: Sweep, positions: ByBody },
+    Jacobi { split: Sweep, start: Start, begin: ByBody, visit: Sweep, last: Sweep, settle: ByBody, positions: ByBody },
+    Penalty { first: ByBody, press: Sweep, settle: ByBody, positions: ByBody },
 }
 
 /// What a sub-step with a warm start begins with.
 struct Start {
-    velocities: Arc<Pass>,
+    velocities: ByBody,
     warm_start: Sweep,
 }
 
@@ -65,6 +49,8 @@ pub(crate) struct Solver {
     bodies: Arc<Pass>,
     constraints: Arc<Pass>,
     carry: Arc<Pass>,
+    /// Where islands have levels of sub-steps.
+    rewind: Option<ByBody>,
     law: Law,
     restitution: Option<Sweep>,
     store: Arc<Pass>,
@@ -78,25 +64,26 @@ impl Sweep {
         })
     }
 
-    fn record(&self, recorder: &mut Recorder, buffers: &Buffers, wide_batches: u32) -> Result<()> {
+    fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
         let own = buffers.buffer("dispatch_args")?;
-        for index in 0..wide_batches {
-            let batch = [index_part("batch", buffers, index)?];
+        let level = level_part(buffers, step)?;
+        for index in 0..step.wide_batches {
+            let batch = [index_part("batch", buffers, index)?, level.clone()];
             recorder.dispatch_indirect(&self.batch, &batch, own, args::batch(index))?;
         }
-        recorder.dispatch_indirect(&self.tail, &[], own, args::TAIL)
+        recorder.dispatch_indirect(&self.tail, &[level], own, args::TAIL)
     }
 }
 
 impl Start {
     fn new(gpu: &Gpu, pipelines: &mut Pipelines) -> Result<Self> {
-        let velocities = pipelines.pass(gpu, "motion", "integrate_velocities")?;
+        let velocities = ByBody::new(gpu, pipelines, "motion", "integrate_velocities")?;
         Ok(Self { velocities, warm_start: Sweep::new(gpu, pipelines, PASSES, "warm_start")? })
     }
 
     fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
-        recorder.dispatch(&self.velocities, &[], by_body(step))?;
-        self.warm_start.record(recorder, buffers, step.wide_batches)
+        self.velocities.record(recorder, buffers, step)?;
+        self.warm_start.record(recorder, buffers, step)
     }
 }
 
@@ -106,31 +93,31 @@ impl Law {
         Ok(match law {
             solver::SOFT => {
                 let (solve, relax) = (sweep(PASSES, "solve")?, sweep(PASSES, "relax")?);
-                let positions = pipelines.pass(gpu, "motion", "integrate_positions")?;
+                let positions = ByBody::new(gpu, pipelines, "motion", "integrate_positions")?;
                 Self::Soft { start: Start::new(gpu, pipelines)?, solve, positions, relax }
             }
             solver::GAUSS_SEIDEL => {
                 let (visit, last) = (sweep(CLASSIC, "gauss_seidel")?, sweep(CLASSIC, "last_gauss_seidel")?);
-                let positions = pipelines.pass(gpu, "motion", "integrate_positions")?;
+                let positions = ByBody::new(gpu, pipelines, "motion", "integrate_positions")?;
                 Self::GaussSeidel { start: Start::new(gpu, pipelines)?, visit, last, positions }
             }
             solver::JACOBI => {
                 let (split, visit, last) =
                     (sweep(CLASSIC, "split")?, sweep(CLASSIC, "jacobi")?, sweep(CLASSIC, "last_jacobi")?);
-                let mut body = |stem, entry| pipelines.pass(gpu, stem, entry);
+                let mut body = |stem, entry| ByBody::new(gpu, pipelines, stem, entry);
                 let (begin, settle) = (body(CLASSIC, "begin")?, body(CLASSIC, "settle")?);
                 let positions = body("motion", "integrate_positions")?;
                 Self::Jacobi { split, start: Start::new(gpu, pipelines)?, begin, visit, last, settle, positions }
             }
             solver::PENALTY => {
                 let press = sweep(CLASSIC, "penalty")?;
-                let mut body = |stem, entry| pipelines.pass(gpu, stem, entry);
+                let mut body = |stem, entry| ByBody::new(gpu, pipelines, stem, entry);
                 let (first, settle) = (body("motion", "first_substep")?, body(CLASSIC, "settle")?);
                 Self::Penalty { first, press, settle, positions: body("motion", "integrate_positions")? }
             }
             _ => {
                 let (load, pass) = (sweep(PASSES, "load")?, sweep(PASSES, "one_pass")?);
-                let mut body = |entry| pipelines.pass(gpu, "motion", entry);
+                let mut body = |entry| ByBody::new(gpu, pipelines, "motion", entry);
                 let [first, next, last] = [body("first_substep")?, body("next_substep")?, body("last_substep")?];
                 Self::OnePass { first, load, pass, next, last }
             }
@@ -138,13 +125,12 @@ impl Law {
     }
 
     fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
-        let (wide, bodies) = (step.wide_batches, by_body(step));
         match self {
             Self::OnePass { first, load, .. } => {
-                recorder.dispatch(first, &[], bodies)?;
-                load.record(recorder, buffers, wide)?;
+                first.record(recorder, buffers, step)?;
+                load.record(recorder, buffers, step)?;
             }
-            Self::Jacobi { split, .. } => split.record(recorder, buffers, wide)?,
+            Self::Jacobi { split, .. } => split.record(recorder, buffers, step)?,
             _ => {}
         }
         (1..=step.substeps).try_for_each(|substep| self.record_substep(recorder, buffers, step, substep))
@@ -157,41 +143,40 @@ impl Law {
         step: &StepParams,
         substep: u32,
     ) -> Result<()> {
-        let (wide, bodies) = (step.wide_batches, by_body(step));
         match self {
             Self::OnePass { pass, next, last, .. } => {
-                pass.record(recorder, buffers, wide)?;
-                recorder.dispatch(if substep < step.substeps { next } else { last }, &[], bodies)
+                pass.record(recorder, buffers, step)?;
+                if substep < step.substeps { next } else { last }.record(recorder, buffers, step)
             }
             Self::Soft { start, solve, positions, relax } => {
                 start.record(recorder, buffers, step)?;
-                solve.record(recorder, buffers, wide)?;
-                recorder.dispatch(positions, &[], bodies)?;
-                relax.record(recorder, buffers, wide)
+                solve.record(recorder, buffers, step)?;
+                positions.record(recorder, buffers, step)?;
+                relax.record(recorder, buffers, step)
             }
             Self::GaussSeidel { start, visit, last, positions } => {
                 start.record(recorder, buffers, step)?;
                 for _ in 1..step.iterations {
-                    visit.record(recorder, buffers, wide)?;
+                    visit.record(recorder, buffers, step)?;
                 }
-                last.record(recorder, buffers, wide)?;
-                recorder.dispatch(positions, &[], bodies)
+                last.record(recorder, buffers, step)?;
+                positions.record(recorder, buffers, step)
             }
             Self::Jacobi { start, begin, visit, last, settle, positions, .. } => {
                 start.record(recorder, buffers, step)?;
-                recorder.dispatch(begin, &[], bodies)?;
+                begin.record(recorder, buffers, step)?;
                 for iteration in 1..=step.iterations {
                     let visit = if iteration < step.iterations { visit } else { last };
-                    visit.record(recorder, buffers, wide)?;
-                    recorder.dispatch(settle, &[], bodies)?;
+                    visit.record(recorder, buffers, step)?;
+                    settle.record(recorder, buffers, step)?;
                 }
-                recorder.dispatch(positions, &[], bodies)
+                positions.record(recorder, buffers, step)
             }
             Self::Penalty { first, press, settle, positions } => {
-                recorder.dispatch(first, &[], bodies)?;
-                press.record(recorder, buffers, wide)?;
-                recorder.dispatch(settle, &[], bodies)?;
-                recorder.dispatch(positions, &[], bodies)
+                first.record(recorder, buffers, step)?;
+                press.record(recorder, buffers, step)?;
+                settle.record(recorder, buffers, step)?;
+                positions.record(recorder, buffers, step)
             }
         }
     }
@@ -209,6 +194,7 @@ impl Solver {
             bodies: pipelines.pass(gpu, "solver/prepare", "bodies")?,
             constraints: pipelines.pass(gpu, "solver/prepare", "constraints")?,
             carry: pipelines.pass(gpu, "solver/prepare", "carry")?,
+            rewind: plan.levels.then(|| ByBody::new(gpu, pipelines, "motion", "rewind")).transpose()?,
             law: Law::new(gpu, pipelines, law)?,
             restitution,
             store: pipelines.pass(gpu, "solver/store", "store")?,
@@ -222,10 +208,18 @@ impl Solver {
         recorder.dispatch_indirect(&self.constraints, &[], own, args::CONSTRAINTS)?;
         recorder.dispatch_indirect(&self.carry, &[], own, args::CONSTRAINTS)?;
         recorder.stage("solver");
-        self.law.record(recorder, buffers, step)?;
-        if let Some(restitution) = &self.restitution {
-            restitution.record(recorder, buffers, step.wide_batches)?;
+        for step in step.by_level() {
+            self.record_level(recorder, buffers, &step)?;
         }
         recorder.dispatch_indirect(&self.store, &[], own, args::CONSTRAINTS)
+    }
+
+    /// Records all sub-steps of the step's level.
+    fn record_level(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
+        if let Some(rewind) = self.rewind.as_ref().filter(|_| step.levels.trailing_zeros() < step.level) {
+            rewind.record(recorder, buffers, step)?;
+        }
+        self.law.record(recorder, buffers, step)?;
+        self.restitution.as_ref().map_or(Ok(()), |restitution| restitution.record(recorder, buffers, step))
     }
 }

@@ -5,6 +5,8 @@ use crate::bounds::Bounds;
 use crate::broadphase::{Broadphase, Choice};
 use crate::contact::Contact;
 use crate::edit::Edit;
+use crate::island::Island;
+use crate::level::Level;
 use crate::motion::Motion;
 use crate::narrowphase::Narrowphase;
 use crate::sleep::Sleep;
@@ -33,6 +35,10 @@ pub(crate) struct Stages {
     narrowphase: Narrowphase,
     /// Where bodies may sleep.
     sleep: Option<Sleep>,
+    /// Where something asks which bodies hang together.
+    island: Option<Island>,
+    /// Where accuracy is on demand.
+    level: Option<Level>,
     batch: Batch,
     solver: Solver,
     motion: Motion,
@@ -47,7 +53,9 @@ impl Stages {
             broadphase: Broadphase::new(gpu, pipelines, sizes, &built.choice)?,
             contact: Contact::new(gpu, pipelines, sizes)?,
             narrowphase: Narrowphase::new(gpu, pipelines, plan)?,
-            sleep: plan.islands.then(|| Sleep::new(gpu, pipelines, sizes)).transpose()?,
+            sleep: plan.sleep.then(|| Sleep::new(gpu, pipelines, sizes)).transpose()?,
+            island: plan.islands().then(|| Island::new(gpu, pipelines)).transpose()?,
+            level: plan.levels.then(|| Level::new(gpu, pipelines)).transpose()?,
             batch: Batch::new(gpu, pipelines, sizes)?,
             solver: Solver::new(gpu, pipelines, plan, built.solver)?,
             motion: Motion::new(gpu, pipelines)?,
@@ -78,6 +86,13 @@ impl Stages {
         self.narrowphase.record(recorder, self.contact.a_pair())?;
         if let Some(sleep) = self.sleep.as_ref().filter(|_| may_sleep) {
             sleep.record_touch(recorder, step, self.contact.a_pair())?;
+        }
+        let leveled = step.tolerance >= 0.0;
+        if let Some(island) = self.island.as_ref().filter(|_| may_sleep || leveled) {
+            island.record(recorder, step, self.contact.a_pair())?;
+        }
+        if let Some(level) = self.level.as_ref().filter(|_| leveled) {
+            level.record(recorder, step, self.contact.a_pair())?;
         }
         self.batch.record(recorder, buffers, step, self.contact.a_pair())?;
 

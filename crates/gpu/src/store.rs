@@ -4,7 +4,7 @@ use crate::{Bind, Buffers, Gpu};
 use bytemuck::Zeroable;
 use tumble_core::layout::{
     Aabb, BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Control, EditRange, EditRecord,
-    FoundManifold, Impulse, Manifold, ManifoldMemory, Pair, PoseRecord, Rest, SolverBody, StepParams,
+    FoundManifold, Impulse, LEVELS, Manifold, ManifoldMemory, Pair, PoseRecord, Rest, SolverBody, StepParams,
 };
 use tumble_core::{PackedScene, Result};
 use wgpu::BufferUsages;
@@ -45,8 +45,8 @@ pub(crate) struct Sizes {
     pub(crate) bodies: u32,
     pub(crate) colliders: u32,
     pub(crate) pairs: u32,
-    /// Bodies if they may sleep, else 0.
-    pub(crate) sleepers: u32,
+    /// Bodies if something asks for their islands, else 0.
+    pub(crate) islands: u32,
 }
 
 /// Which count an array follows.
@@ -55,11 +55,11 @@ enum Per {
     Body,
     Collider,
     Pair,
-    Sleeper,
+    Island,
 }
 
 /// Name, bytes of an element, what it follows, whether its content outlives a step.
-const ARRAYS: [(&str, usize, Per, bool); 34] = [
+const ARRAYS: [(&str, usize, Per, bool); 36] = [
     ("states", size_of::<BodyState>(), Per::Body, true),
     ("work_states", size_of::<BodyState>(), Per::Body, false),
     ("props", size_of::<BodyProps>(), Per::Body, true),
@@ -68,9 +68,11 @@ const ARRAYS: [(&str, usize, Per, bool); 34] = [
     ("shares", 4, Per::Body, false),
     ("masks", 8, Per::Body, false),
     ("claims", 4, Per::Body, false),
-    ("islands", 4, Per::Sleeper, false),
-    ("stirs", 4, Per::Sleeper, false),
-    ("rests", size_of::<Rest>(), Per::Sleeper, true),
+    ("islands", 4, Per::Island, false),
+    ("island_credits", 4, Per::Island, false),
+    ("island_overlaps", 4, Per::Island, false),
+    ("stirs", 4, Per::Island, false),
+    ("rests", size_of::<Rest>(), Per::Island, true),
     ("colliders", size_of::<Collider>(), Per::Collider, true),
     ("aabbs", size_of::<Aabb>(), Per::Collider, false),
     ("large_list", 4, Per::Collider, false),
@@ -101,12 +103,22 @@ pub(crate) fn index_part<'a>(name: &'a str, buffers: &'a Buffers, index: u32) ->
     Ok(Bind::part(name, buffers.buffer("indices")?, 256 * index as u64, 16))
 }
 
+/// Where the numbers of a level's step lie in `level_steps`, bytes.
+pub(crate) fn level_offset(step: &StepParams) -> u64 {
+    256 * u64::from(step.level)
+}
+
+/// Those numbers as the uniform `step`.
+pub(crate) fn level_part<'a>(buffers: &'a Buffers, step: &StepParams) -> Result<Bind<'a>> {
+    Ok(Bind::part("step", buffers.buffer("level_steps")?, level_offset(step), size_of::<StepParams>() as u64))
+}
+
 fn count(per: Per, sizes: &Sizes) -> u64 {
     u64::from(match per {
         Per::Body => sizes.bodies,
         Per::Collider => sizes.colliders,
         Per::Pair => sizes.pairs,
-        Per::Sleeper => sizes.sleepers,
+        Per::Island => sizes.islands,
     })
 }
 
@@ -121,6 +133,7 @@ pub(crate) fn create(gpu: &Gpu, packed: &PackedScene, sizes: &Sizes, edits: u32)
     buffers.create(gpu, "control", size_of::<Control>() as u64, 1, storage | uniform)?;
     buffers.alias("counters", "control");
     buffers.create(gpu, "step", size_of::<StepParams>() as u64, 1, uniform)?;
+    buffers.create(gpu, "level_steps", 256, LEVELS.into(), uniform)?;
     buffers.create(gpu, "class_histogram", 4, 1024, storage)?;
     buffers.create(gpu, "dispatch_args", 16, args::COUNT, storage | BufferUsages::INDIRECT)?;
     buffers.create(gpu, "edit_records", size_of::<EditRecord>() as u64, edits.into(), storage)?;

@@ -2,7 +2,7 @@
 
 use super::{Engine, Facts, Means, Refusal, Setting, timed};
 use tumble::prelude::*;
-use tumble_core::{Scene, StageTime, Velocities};
+use tumble_core::{Accuracy, Scene, StageTime, Velocities};
 
 /// Position, rotation, both velocities.
 const BYTES_A_BODY: u64 = 4 * (3 + 4 + 3 + 3);
@@ -23,7 +23,7 @@ pub(super) fn has_gpu(means: &Means) -> Result<(), String> {
 fn params(setting: &Setting) -> Params {
     Params {
         dt: setting.dt,
-        substeps: setting.substeps,
+        accuracy: Accuracy::Substeps(setting.substeps),
         threads: Some(setting.threads),
         broadphase: setting.broadphase,
         solver: setting.solver,

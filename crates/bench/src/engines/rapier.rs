@@ -2,7 +2,9 @@
 
 use super::{Engine, Facts, Means, Refusal, Setting, timed};
 use rapier3d::prelude as r;
-use tumble_core::{BodyHandle, CombineRule, Params, Pose, Poses, RigidBodyType, Scene, Shape, Velocities, Velocity};
+use tumble_core::{
+    Accuracy, BodyHandle, CombineRule, Params, Pose, Poses, RigidBodyType, Scene, Shape, Velocities, Velocity,
+};
 
 /// A scene in rapier, with sleep off.
 pub struct RapierWorld {
@@ -27,7 +29,7 @@ impl RapierWorld {
     pub fn new(scene: &Scene, params: &Params, threads: usize) -> Self {
         let mut world = r::PhysicsWorld { gravity: scene.gravity, ..r::PhysicsWorld::default() };
         world.integration_parameters.dt = params.dt;
-        world.integration_parameters.num_solver_iterations = params.substeps as usize;
+        world.integration_parameters.num_solver_iterations = params.accuracy.fewest() as usize;
         world.physics_pipeline.configure_thread_pool(threads).expect("rapier's threads start");
         let mut bodies = Vec::new();
         for handle in scene.bodies() {
@@ -100,7 +102,7 @@ impl RapierWorld {
 }
 
 pub(super) fn make(scene: &Scene, setting: &Setting, _: &Means) -> Result<Box<dyn Engine>, Refusal> {
-    let params = Params { dt: setting.dt, substeps: setting.substeps, ..Params::default() };
+    let params = Params { dt: setting.dt, accuracy: Accuracy::Substeps(setting.substeps), ..Params::default() };
     Ok(Box::new(Rapier { world: RapierWorld::new(scene, &params, setting.threads), threads: setting.threads }))
 }
 

@@ -38,12 +38,14 @@ pub struct BodyState {
     pub generation: u32,
     /// rad/s, world frame.
     pub angular_velocity: [f32; 3],
-    /// Unused.
-    pub pad_a: u32,
+    /// Accuracy on demand: the level of sub-steps that the body's island wants, times [`LEVEL_HOLD`](super::LEVEL_HOLD),
+    /// plus how many calm steps are left before it wants a lower one.
+    pub credit: u32,
     /// Force of the coming step, N; cleared when it commits.
     pub force: [f32; 3],
-    /// Unused.
-    pub pad_b: u32,
+    /// Length of the sub-steps that the last step took for it, s: impulses that carry over are those of one of them. 0
+    /// before its first step.
+    pub h: f32,
     /// Torque of the coming step about the centre of mass, N m, world frame.
     pub torque: [f32; 3],
     /// Estimate of how fast the impulses that the body bears can change: the smallest eigenvalue of the scaled contact
@@ -120,8 +122,8 @@ pub struct SolverBody {
     pub delta: [f32; 4],
     /// xx, yy, zz of the inverse inertia in the world frame at the start of the step, 1/(kg m²).
     pub inverse_inertia_diagonal: [f32; 3],
-    /// Unused.
-    pub pad_b: u32,
+    /// Level of sub-steps that it is solved at, see [`StepParams::levels`](super::StepParams::levels).
+    pub level: u32,
     /// xy, xz, yz of the same.
     pub inverse_inertia_off: [f32; 3],
     /// Unused.

@@ -46,8 +46,8 @@ pub struct ConstraintHead {
     pub surface_velocity: [f32; 2],
     /// Inertia that twisting sees, kg m²; 0 where nothing resists.
     pub twisting_inertia: f32,
-    /// Unused.
-    pub pad_a: u32,
+    /// Level of sub-steps, that of its moving bodies.
+    pub level: u32,
 }
 
 /// One contact point as the solver sees it. 48 bytes.

@@ -25,7 +25,7 @@ pub mod overflow {
     pub const SWEEP: u32 = 5;
 }
 
-/// Counters and decisions of a step, kept where the passes run. 480 bytes.
+/// Counters and decisions of a step, kept where the passes run. 496 bytes.
 ///
 /// Everything from `pair_count` on is written anew each step. `stop` is sticky: raised in the plan phase, cleared by
 /// the host when the buffer has grown.
@@ -113,6 +113,17 @@ pub struct Control {
     pub awake: u32,
     /// Manifolds with points of those asleep, which are no constraints of the step.
     pub manifolds_asleep: u32,
+    /// Accuracy on demand: bit l where some body wants level l.
+    pub levels_wanted: u32,
+    /// The same of the level that it got.
+    pub levels_used: u32,
+
+    /// Constraints, each times its sub-steps, modulo 2^32.
+    pub visits: u32,
+    /// Deepest overlap, m, as float bits.
+    pub residual: u32,
+    /// Bodies of islands with more overlap than the tolerance.
+    pub bodies_over: u32,
     /// Unused.
-    pub pad_c: [u32; 2],
+    pub pad_c: u32,
 }

@@ -14,7 +14,7 @@ pub mod solver {
     pub const PENALTY: u32 = 4;
 }
 
-/// What one step is told, as a uniform. 160 bytes.
+/// What one step is told, as a uniform. 176 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct StepParams {
@@ -92,8 +92,14 @@ pub struct StepParams {
     pub iterations: u32,
     /// The same: overlap left alone, m.
     pub slop: f32,
+    /// Bit l where this step runs level l of sub-steps: those with 2^l times the sub-steps of the lowest.
+    pub levels: u32,
+    /// Level that `h` and all that follows from it are of: 0, but in a level's own passes.
+    pub level: u32,
+    /// Accuracy on demand: overlap that may be left, m; below 0 where none is measured.
+    pub tolerance: f32,
     /// Unused.
-    pub pad_a: u32,
+    pub pad_a: [u32; 2],
 }
 
 /// Words of [`StepParams::batching`]: a law, and flags.

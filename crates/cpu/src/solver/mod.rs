@@ -36,6 +36,7 @@ mod soft;
 mod soft_lanes;
 pub mod store;
 
+use crate::bounds::moves;
 use crate::math::tangents;
 use crate::motion;
 use lanes::{ConstraintLanes, LANES};
@@ -253,7 +254,7 @@ enum Pass {
 /// What is done to each body.
 type BodyPass = fn(&mut SolverBody, &BodyState, &BodyProps, &StepParams);
 
-/// Runs all sub-steps, by the law of `step.solver`.
+/// Runs all sub-steps of the step's level, by the law of `step.solver`.
 pub fn solve(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, restitution: bool) {
     passes::run(rows, bodies, step, &schedule(step, restitution));
 }
@@ -263,16 +264,28 @@ pub fn solve_plain(rows: &mut PlainRows, bodies: Bodies<'_>, step: &StepParams, 
     let Bodies { solver, states, props } = bodies;
     for pass in schedule(step, restitution) {
         match pass {
-            Pass::Bodies(each) => (0..solver.len()).for_each(|i| each(&mut solver[i], &states[i], &props[i], step)),
+            Pass::Bodies(each) => {
+                for (i, body) in solver.iter_mut().enumerate().filter(|(i, body)| takes_part(body, &states[*i], step)) {
+                    each(body, &states[i], &props[i], step);
+                }
+            }
             Pass::Sweep(visit) => rows.sweep(solver, step, visit),
         }
     }
 }
 
-/// The passes of a step, in order.
+/// Whether a body is one of those of the step's level, or one that nothing pushes, which takes part in all.
+fn takes_part(body: &SolverBody, state: &BodyState, step: &StepParams) -> bool {
+    body.level == step.level || !moves(state.flags)
+}
+
+/// The passes of one level of a step, in order.
 fn schedule(step: &StepParams, restitution: bool) -> Vec<Pass> {
     use Pass::{Bodies, Sweep};
     let mut passes = Vec::new();
+    if step.levels.trailing_zeros() < step.level {
+        passes.push(Bodies(motion::rewind));
+    }
     match step.solver {
         solver::ONE_PASS => {
             passes.extend([Bodies(motion::first_substep), Sweep(Visit::Load)]);

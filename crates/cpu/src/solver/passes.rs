@@ -4,7 +4,9 @@
 //! are worked off as one block: handing each to the next thread costs more than it gives.
 
 use super::lanes::{BodyLanes, ConstraintLanes, Lane, Weights};
-use super::{Bodies, Pass, Rows, Visit, gauss_seidel_lanes, jacobi_lanes, one_pass_lanes, penalty_lanes, soft_lanes};
+use super::{
+    Bodies, Pass, Rows, Visit, gauss_seidel_lanes, jacobi_lanes, one_pass_lanes, penalty_lanes, soft_lanes, takes_part,
+};
 use crate::shared::Shared;
 use crate::workers::{block_of, blocks, run_stages};
 use std::ops::Range;
@@ -70,7 +72,9 @@ pub(super) fn run(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, passes
             for i in block_of(&all, block, body_blocks) {
                 // SAFETY: blocks of a stage share no body.
                 let body = unsafe { &mut bodies.slice_mut(i..i + 1)[0] };
-                each(body, &states[i], &props[i], step);
+                if takes_part(body, &states[i], step) {
+                    each(body, &states[i], &props[i], step);
+                }
             }
         }
         (Pass::Sweep(visit), Some(part)) => {

@@ -13,7 +13,7 @@ use tumble_core::layout::{
 };
 
 /// A body as the solver moves it; what nothing may push has no mass and keeps its velocity.
-pub fn prepare_body(state: &BodyState, props: &BodyProps, mask: u64) -> SolverBody {
+pub fn prepare_body(state: &BodyState, props: &BodyProps, mask: u64, step: &StepParams) -> SolverBody {
     let mut body = SolverBody {
         linear_velocity: state.linear_velocity,
         inverse_mass: 0.0,
@@ -23,7 +23,7 @@ pub fn prepare_body(state: &BodyState, props: &BodyProps, mask: u64) -> SolverBo
         eigenvalue: state.eigenvalue,
         delta: [0.0, 0.0, 0.0, 1.0],
         inverse_inertia_diagonal: [0.0; 3],
-        pad_b: 0,
+        level: step.level_of(state.credit),
         inverse_inertia_off: [0.0; 3],
         pad_c: 0,
         linear_start: [0.0; 3],
@@ -57,6 +57,19 @@ pub struct Contact<'a> {
     pub stored: &'a [Impulse],
     /// What it remembers of the manifold as a whole.
     pub memory: &'a ManifoldMemory,
+    /// What the impulses are scaled by, see [`scale`].
+    pub scale: f32,
+}
+
+/// The level of sub-steps of a constraint: bodies of one island have the same.
+pub fn level(a: &SolverBody, b: &SolverBody) -> u32 {
+    if a.inverse_mass > 0.0 { a.level } else { b.level }
+}
+
+/// Length of this step's sub-steps over that of those that the impulses between two bodies are from.
+pub fn scale(a: &BodyState, b: &BodyState, h: f32) -> f32 {
+    let was = a.h.max(b.h);
+    if was == h || was == 0.0 { 1.0 } else { h / was }
 }
 
 /// One constraint's head, points and impulses.
@@ -129,6 +142,7 @@ pub(super) fn prepare_head(
         round_a: round(ca, manifold),
         round_b: -round(cb, manifold),
         between: manifold.between,
+        level: level(&bodies[ca.body as usize], &bodies[cb.body as usize]),
         ..ConstraintHead::zeroed()
     };
     head.rolling_resistance = ca.rolling_resistance.max(cb.rolling_resistance);
@@ -148,7 +162,7 @@ pub(super) fn prepare_head(
         head.twisting_inertia = inverse(about(normal, normal));
         // Solvers that do not resist must not go on with what others left.
         let none = is_fresh(contact) || step.solver > solver::SOFT;
-        head.resisted = if none { [0.0; 3] } else { contact.memory.resisted };
+        head.resisted = if none { [0.0; 3] } else { contact.memory.resisted.map(|r| contact.scale * r) };
     }
     if ca.surface_velocity != [0.0; 3] || cb.surface_velocity != [0.0; 3] {
         let (t1, t2) = tangents(vec3(manifold.normal));
@@ -180,7 +194,7 @@ fn round(collider: &Collider, manifold: &Manifold) -> f32 {
 
 /// What the slot remembers, shared among the points; nothing where it had no contact.
 fn remembered(contact: &Contact<'_>) -> f32 {
-    if is_fresh(contact) { 0.0 } else { contact.memory.remembered / contact.manifold.count as f32 }
+    if is_fresh(contact) { 0.0 } else { contact.scale * (contact.memory.remembered / contact.manifold.count as f32) }
 }
 
 /// Whether the slot had no contact of this pair before.
@@ -193,7 +207,11 @@ pub(super) fn carry(contact: &Contact<'_>, point: usize) -> (Impulse, f32) {
     let feature = contact.manifold.features[point];
     let fresh = contact.pair.kind & pair_kind::FRESH != 0;
     match contact.stored.iter().rposition(|s| !fresh && s.feature == feature) {
-        Some(k) => (contact.stored[k], contact.memory.deviations[k]),
+        Some(k) => {
+            let stored = &contact.stored[k];
+            let (normal, tangent) = (contact.scale * stored.normal, stored.tangent.map(|t| contact.scale * t));
+            (Impulse { normal, tangent, feature }, contact.scale * contact.memory.deviations[k])
+        }
         None => (Impulse { normal: 0.0, tangent: [0.0; 2], feature }, 0.0),
     }
 }

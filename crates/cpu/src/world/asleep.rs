@@ -285,7 +285,10 @@ impl Kept {
         ends: &[Ends],
         step: &StepParams,
     ) -> Vec<u32> {
-        may_sleep(step).map_or(Vec::new(), |_| island::label(states, manifolds, ends))
+        match may_sleep(step).is_some() || step.tolerance >= 0.0 {
+            true => island::label(states, manifolds, ends),
+            false => Vec::new(),
+        }
     }
 
     /// Looks who has rested long enough, and puts whole islands to sleep. `self.states` are those after the step, and

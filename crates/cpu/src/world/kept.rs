@@ -1,12 +1,12 @@
 //! What a world keeps, and a step of it: the plan phase, which writes nothing that lasts, and the commit.
 
 use super::asleep::{self, Asleep, Outcome, Waking};
-use crate::batch::{self, Batches, Ends};
+use crate::batch::{self, Batches, Ends, Ordered};
 use crate::broadphase::{self, Boxes, Finder, Search, TooMany};
 use crate::contact::{self, Matched};
 use crate::shared::Shared;
 use crate::solver::{self, Rows, prepare, store};
-use crate::{bounds, continuous, edit, motion, narrowphase, sleep};
+use crate::{bounds, continuous, edit, level, motion, narrowphase, sleep};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -222,21 +222,32 @@ impl Kept {
         let run = watch.begin("prepare");
         let Planned { mut states, matched, manifolds, batches, mut control, ends, waking } = planned;
         let labels = self.labels(&states, &manifolds, &ends, step);
+        if step.tolerance >= 0.0 {
+            level::decide(&mut states, &labels, &manifolds, &ends, step, &mut control);
+        }
         let mut bodies: Vec<SolverBody> = (0..states.len())
             .into_par_iter()
             .with_min_len(256)
-            .map(|i| prepare::prepare_body(&states[i], &self.props[i], batches.masks[i]))
+            .map(|i| prepare::prepare_body(&states[i], &self.props[i], batches.masks[i], step))
             .collect();
-        self.rows.build(&batches.start, &self.colliders, &bodies, &states, step, |c| {
-            let index = batches.order[c] as usize;
-            let pair = &matched.pairs[index];
-            let stored = &self.impulses[4 * pair.slot as usize..][..4];
-            let memory = &self.memory[pair.slot as usize];
-            prepare::Contact { pair, manifold: &manifolds[index], stored, memory }
-        });
-        let run = watch.next(run, "solver");
-        let moving = solver::Bodies { solver: &mut bodies, states: &states, props: &self.props };
-        solver::solve(&mut self.rows, moving, step, restitution);
+        let mut run = run;
+        for step in step.by_level() {
+            let own = self.of_level(&batches, &matched, &bodies, &step);
+            run = watch.next(run, "prepare");
+            self.rows.build(&own.start, &self.colliders, &bodies, &states, &step, |c| {
+                let index = own.order[c] as usize;
+                let pair = &matched.pairs[index];
+                let [a, b] = bodies_of(pair, &self.colliders).map(|body| &states[body]);
+                let stored = &self.impulses[4 * pair.slot as usize..][..4];
+                let memory = &self.memory[pair.slot as usize];
+                let scale = prepare::scale(a, b, step.h);
+                prepare::Contact { pair, manifold: &manifolds[index], stored, memory, scale }
+            });
+            run = watch.next(run, "solver");
+            let moving = solver::Bodies { solver: &mut bodies, states: &states, props: &self.props };
+            solver::solve(&mut self.rows, moving, &step, restitution);
+            self.store(&own.order, &matched, &manifolds);
+        }
         let run = watch.next(run, "motion");
         contact::commit_free(&mut self.free, &matched);
         self.commit_slots(&states, &matched, &manifolds, &batches);
@@ -249,7 +260,7 @@ impl Kept {
         self.poses.resize(states.len(), PoseRecord::zeroed());
         let moved = bodies.par_iter().zip(&self.props).zip(states.par_iter_mut().zip(&mut self.poses));
         let bad = moved.enumerate().with_min_len(256).filter_map(|(slot, ((body, props), (state, pose)))| {
-            let (new, bad) = motion::commit(body, state, shares[slot]);
+            let (new, bad) = motion::commit(body, state, shares[slot], step);
             (*state, *pose) = (new, PoseRecord::of(&new, props));
             bad.then_some(slot)
         });
@@ -269,7 +280,39 @@ impl Kept {
         watch.end(run);
     }
 
-    /// What the slots remember: how the contact was found, its batch, its impulses.
+    /// The constraints of the step's level in their order.
+    fn of_level<'a>(
+        &self,
+        batches: &'a Batches,
+        matched: &Matched,
+        bodies: &[SolverBody],
+        step: &StepParams,
+    ) -> Ordered<'a> {
+        if step.levels.count_ones() == 1 {
+            return Ordered { order: Cow::from(&batches.order), start: Cow::from(&batches.start) };
+        }
+        batches.of_level(|pair| {
+            let [a, b] = bodies_of(&matched.pairs[pair as usize], &self.colliders).map(|body| &bodies[body]);
+            prepare::level(a, b) == step.level
+        })
+    }
+
+    /// What the slots remember of each constraint that was solved, those in the rows.
+    fn store(&mut self, order: &[u32], matched: &Matched, manifolds: &[Manifold]) {
+        let memory = Shared::new(&mut self.memory);
+        let impulses = Shared::new(bytemuck::cast_slice_mut::<Impulse, [Impulse; 4]>(&mut self.impulses));
+        self.rows.for_each_constraint(|c, solved| {
+            let index = order[c] as usize;
+            let slot = matched.pairs[index].slot as usize;
+            let stored = std::array::from_fn(|k| store::store(&manifolds[index], k, solved));
+            // SAFETY: the pairs of one list have slots of their own (`contact`), and each constraint is one of them.
+            unsafe { impulses.set(slot, stored) };
+            // SAFETY: as above.
+            unsafe { memory.set(slot, store::store_memory(&manifolds[index], solved)) };
+        });
+    }
+
+    /// What the slots remember of each pair: how the contact was found, its batch, and no impulse where none touch.
     fn commit_slots(&mut self, states: &[BodyState], matched: &Matched, manifolds: &[Manifold], batches: &Batches) {
         let rotation = |collider: u32| states[self.colliders[collider as usize].body as usize].rotation;
         let found = Shared::new(&mut self.found);
@@ -291,16 +334,6 @@ impl Kept {
                 unsafe { impulses.set(slot, own) };
             }
         });
-        let memory = Shared::new(&mut self.memory);
-        self.rows.for_each_constraint(|c, solved| {
-            let index = batches.order[c] as usize;
-            let slot = matched.pairs[index].slot as usize;
-            let stored = std::array::from_fn(|k| store::store(&manifolds[index], k, solved));
-            // SAFETY: as above; each constraint is one of those pairs.
-            unsafe { impulses.set(slot, stored) };
-            // SAFETY: as above.
-            unsafe { memory.set(slot, store::store_memory(&manifolds[index], solved)) };
-        });
     }
 }
 
@@ -309,6 +342,11 @@ fn reserve<T>(buffer: &mut Vec<T>, count: usize, name: &str) -> Result<()> {
     let more = count.saturating_sub(buffer.len());
     let bytes = (count * size_of::<T>()) as u64;
     buffer.try_reserve_exact(more).map_err(|_| Error::OutOfMemory { buffer: name.into(), bytes })
+}
+
+/// The bodies of a pair.
+fn bodies_of(pair: &Pair, colliders: &[Collider]) -> [usize; 2] {
+    [pair.a, pair.b].map(|collider| colliders[collider as usize].body as usize)
 }
 
 /// Names a body newly in quarantine; of those that share a place, the highest slot.

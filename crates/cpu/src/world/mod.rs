@@ -16,7 +16,9 @@ use tumble_core::edit::EditBatch;
 use tumble_core::layout::{Control, PoseRecord, StepParams};
 use tumble_core::limits::{self, Room};
 use tumble_core::stopwatch::{Span, Stopwatch};
-use tumble_core::{Broadphase, Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities};
+use tumble_core::{
+    Broadphase, Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities, WantedLevels,
+};
 
 /// A scene of no more colliders runs on the caller's thread: none of its passes is long enough to be shared, and waking
 /// others took longer than the step (one free box: 32 us a step with two threads, 3 us alone).
@@ -40,6 +42,8 @@ pub struct World {
     watch: Stopwatch,
     /// What the last committed step was told.
     last_step: StepParams,
+    /// Levels of sub-steps that the last few steps wanted.
+    levels: WantedLevels,
     /// Why the last step did not run.
     failed: Option<Error>,
 }
@@ -89,6 +93,7 @@ impl World {
             queries: query::Cached::default(),
             watch: Stopwatch::default(),
             last_step: StepParams::zeroed(),
+            levels: WantedLevels::default(),
             failed: None,
         })
     }
@@ -156,6 +161,7 @@ impl World {
         step.cell_table_bits = limits::cell_table_bits(step.collider_count);
         step.large_limit = limits::large_limit(step.collider_count, self.editor.spread().is_wide());
         step.drop_pair = self.drop_pair;
+        step.levels = self.levels.of(&step);
         if self.kept.is_idle(&edits, &step) {
             self.kept.pass_time(&step);
             self.last_step.step = step.step;
@@ -250,6 +256,7 @@ impl World {
 
     /// `attempt`: where the runs of the one that went through begin.
     fn finish(&mut self, attempt: usize, broadphase: Broadphase) {
+        self.levels.push(&self.kept.control);
         let mut report = StepReport::from_control(&self.kept.control);
         report.backend = "cpu";
         report.adapter = self.adapter.clone();
@@ -258,6 +265,7 @@ impl World {
         report.broadphase = broadphase;
         report.broadphase_bytes = self.finder.bytes();
         report.memory_bytes = self.kept.bytes() + self.finder.bytes() + self.queries.bytes();
+        report.accuracy = StepReport::spent(&self.kept.control, &self.last_step);
         report.stages = StageTime::sums(&self.watch.runs()[attempt..]);
         report.host_runs = self.watch.runs().to_vec();
         self.report = report;

@@ -92,8 +92,8 @@ impl World {
 
     fn grow_scene(&mut self, sizes: Sizes) -> Result<()> {
         self.take_statuses(0)?;
-        let sleepers = if self.built.plan.islands { sizes.bodies } else { 0 };
-        let sizes = Sizes { pairs: self.sizes.pairs, sleepers, ..sizes };
+        let islands = if self.built.plan.islands() { sizes.bodies } else { 0 };
+        let sizes = Sizes { pairs: self.sizes.pairs, islands, ..sizes };
         store::grow(&self.gpu, &mut self.buffers, &sizes)?;
         self.stages = Stages::new(&self.gpu, &mut self.pipelines, &sizes, &self.built)?;
         self.pose_copies = Readback::new(&self.gpu, "pose copy", pose_bytes(&sizes), 1)?;

@@ -8,7 +8,7 @@ use crate::broadphase::Choice;
 use crate::query::Query;
 use crate::readback::{Readback, read_now};
 use crate::stages::{Built, Stages};
-use crate::store::{self, Sizes};
+use crate::store::{self, Sizes, level_offset};
 use crate::{BindCache, Buffers, Gpu, Pipelines, Recorder, Timer};
 use bytemuck::Zeroable;
 use glam::Vec3;
@@ -18,7 +18,7 @@ use tumble_core::edit::EditBatch;
 use tumble_core::layout::{Control, LAST_BATCH, Pair, PoseRecord, StepParams};
 use tumble_core::limits::{self, Room};
 use tumble_core::stopwatch::{Span, Stopwatch};
-use tumble_core::{Editor, Params, Plan, Poses, Result, Scene, StageRun, StageTime, StepReport};
+use tumble_core::{Editor, Params, Poses, Result, Scene, StageRun, StageTime, StepReport, WantedLevels};
 
 /// Steps in flight before `step` waits.
 const IN_FLIGHT: usize = 3;
@@ -62,6 +62,8 @@ pub struct World {
     /// Of the last few steps: the number, how many batches were worth a dispatch, and how many bodies were awake where
     /// they may sleep.
     known: VecDeque<(u32, u32, u32)>,
+    /// Levels of sub-steps that the last few steps wanted.
+    levels: WantedLevels,
     /// Gravity and speculative distance of the last step, as bits, if bodies could sleep in it.
     told: Option<[u32; 4]>,
     /// The last step that had edits, or woke all.
@@ -125,14 +127,14 @@ impl World {
         let (bodies, colliders) = (packed.states.len() as u32, packed.colliders.len() as u32);
         let pairs = limits::initial_pairs(&within(&gpu, &params), colliders);
         let room = Room::first(&params.capacities, bodies, colliders);
-        let sleepers = if params.sleep.is_some() { room.bodies } else { 0 };
-        let sizes = Sizes { bodies: room.bodies, colliders: room.colliders, pairs, sleepers };
+        let plan = packed.plan.with(&params);
+        let islands = if plan.islands() { room.bodies } else { 0 };
+        let sizes = Sizes { bodies: room.bodies, colliders: room.colliders, pairs, islands };
         let buffers = store::create(&gpu, &packed, &sizes, room.edits)?;
         let poses: Vec<PoseRecord> =
             packed.states.iter().zip(&packed.props).map(|(s, p)| PoseRecord::of(s, p)).collect();
         gpu.queue.write_buffer(buffers.buffer("poses")?, 0, bytemuck::cast_slice(&poses));
         let solver = params.step_params(0, Vec3::ZERO).solver;
-        let plan = with_sleep(packed.plan, &params);
         let built = Built { plan, choice: Choice::new(&params, &editor), solver };
         let stages = {
             let _span = Span::enter("pipelines");
@@ -152,6 +154,7 @@ impl World {
             last_step: StepParams::zeroed(),
             most_pairs: 0,
             known: VecDeque::new(),
+            levels: WantedLevels::default(),
             told: None,
             disturbed: 0,
             wide: WIDE,
@@ -272,7 +275,7 @@ impl World {
         step.collider_count = colliders;
         step.edit_ranges = edits.ranges.len() as u32;
         step.cell_table_bits = limits::cell_table_bits(colliders);
-        let plan = with_sleep(self.editor.plan(), &self.params);
+        let plan = self.editor.plan().with(&self.params);
         let choice = Choice::new(&self.params, &self.editor);
         let wants = Built { plan, choice, solver: step.solver };
         step.large_limit = limits::large_limit(colliders, wants.choice.large_tree);
@@ -308,6 +311,7 @@ impl World {
         report.broadphase_bytes = self.stages.broadphase.bytes();
         report.memory_bytes = self.buffers.bytes() + self.stages.bytes();
         report.memory_bytes += self.query.as_ref().map_or(0, Query::bytes);
+        report.accuracy = StepReport::spent(&self.last, &self.last_step);
         report.stages = StageTime::sums(&self.device_runs);
         report.host_runs = self.watch.runs().to_vec();
         report.device_runs = self.device_runs.clone();
@@ -322,8 +326,8 @@ impl World {
         if widened || (wanted.choice, wanted.solver) != (choice, solver) {
             (wanted.choice, wanted.solver) = (choice, solver);
             let run = self.watch.begin("pipelines");
-            if wanted.plan.islands && self.sizes.sleepers == 0 {
-                self.sizes.sleepers = self.sizes.bodies;
+            if wanted.plan.islands() && self.sizes.islands == 0 {
+                self.sizes.islands = self.sizes.bodies;
                 store::grow(&self.gpu, &mut self.buffers, &self.sizes)?;
             }
             self.stages = Stages::new(&self.gpu, &mut self.pipelines, &self.sizes, &wanted)?;
@@ -334,6 +338,7 @@ impl World {
         step.pair_capacity = self.sizes.pairs;
         // The report of exactly three steps ago, so that no decision hangs on what has arrived. (It only decides which
         // dispatch a batch is in: the bits are the same.)
+        step.levels = self.levels.of(step);
         let known = self.known.iter().find(|(number, ..)| number + limits::STATUS_DELAY == step.step);
         step.wide_batches = known.map_or(WIDE_BATCHES, |(_, count, _)| *count);
         // Nothing was awake then, and nothing has happened since that could wake anybody.
@@ -365,6 +370,9 @@ impl World {
         let edits = &record.edits;
         let queue = &self.gpu.queue;
         queue.write_buffer(self.buffers.buffer("step")?, 0, bytemuck::bytes_of(&record.step));
+        for step in record.step.by_level() {
+            queue.write_buffer(self.buffers.buffer("level_steps")?, level_offset(&step), bytemuck::bytes_of(&step));
+        }
         queue.write_buffer(self.buffers.buffer("edit_records")?, 0, bytemuck::cast_slice(&edits.records));
         queue.write_buffer(self.buffers.buffer("edit_ranges")?, 0, bytemuck::cast_slice(&edits.ranges));
         Ok(())
@@ -397,6 +405,7 @@ impl World {
                 let awake = if record.step.sleep_distance >= 0.0 { status.awake } else { u32::MAX };
                 self.known.push_back((record.step.step, wide_batches(&status, self.wide), awake));
                 self.last_step = record.step;
+                self.levels.push(&status);
                 self.most_pairs = self.most_pairs.max(status.old_pair_count);
                 if self.known.len() > 2 * IN_FLIGHT {
                     self.known.pop_front();
@@ -413,11 +422,6 @@ impl World {
         }
         self.gpu.check()
     }
-}
-
-/// The plan with what sleep needs.
-fn with_sleep(plan: Plan, params: &Params) -> Plan {
-    Plan { islands: plan.islands || params.sleep.is_some(), ..plan }
 }
 
 /// How many of the first batches have a dispatch of their own: up to the last that is worth one.

@@ -1,0 +1,127 @@
+//! How many sub-steps a step takes: as told, or as many as each island needs.
+
+use crate::error::{Result, check};
+use crate::layout::{Control, LEVELS, StepParams};
+use crate::limits::STATUS_DELAY;
+use std::collections::VecDeque;
+use std::fmt;
+
+/// How accurate a step is to be. Collisions are found once a step, contacts are solved once a sub-step; what contacts give
+/// way by falls with the square of a sub-step's length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Accuracy {
+    /// This many sub-steps for everything, 1 to 256.
+    Substeps(u32),
+    /// As many as it takes, for each island by itself (bodies that hang together by contacts): the overlap that a step
+    /// leaves is measured at the beginning of the next one, and an island that left more than the tolerance gets twice
+    /// the sub-steps, at once and again and again up to the cap; one that stays below an eighth of it gets half as many
+    /// after 16 steps. So is one that would buckle with fewer. What an island takes is known three steps late, as on a
+    /// GPU. What was spent and what is left: [`StepReport::accuracy`](crate::StepReport::accuracy).
+    ///
+    /// Overlap is not all error: what is thrown at a heap overlaps for a while whatever is spent.
+    Tolerance {
+        /// Deepest overlap that may be left, m; 1e-6 to 1.
+        penetration: f32,
+        /// Most sub-steps that any island gets; a multiple of 8, 8 to 256. Islands take all of them, a half, a quarter or
+        /// an eighth.
+        most: u32,
+    },
+}
+
+impl Default for Accuracy {
+    /// 8 sub-steps: one sweep each, they take the time of 4 soft sub-steps.
+    fn default() -> Self {
+        Self::Substeps(8)
+    }
+}
+
+impl fmt::Display for Accuracy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Substeps(1) => write!(f, "1 sub-step"),
+            Self::Substeps(n) => write!(f, "{n} sub-steps"),
+            Self::Tolerance { penetration, most } => {
+                write!(f, "{} mm, {most} sub-steps at most", 1e3 * penetration)
+            }
+        }
+    }
+}
+
+impl Accuracy {
+    pub(crate) fn validate(&self, what: impl Fn() -> String) -> Result<()> {
+        let what = &what;
+        match *self {
+            Self::Substeps(n) => check((1..=256).contains(&n), what, "accuracy.substeps", n, "1 to 256"),
+            Self::Tolerance { penetration, most } => {
+                check((1e-6..=1.0).contains(&penetration), what, "accuracy.penetration", penetration, "1e-6 to 1 m")?;
+                let even = most.is_multiple_of(1 << (LEVELS - 1));
+                check(even && (1..=256).contains(&most), what, "accuracy.most", most, "a multiple of 8, 8 to 256")
+            }
+        }
+    }
+
+    /// Sub-steps of level 0, the lowest.
+    pub fn fewest(&self) -> u32 {
+        match *self {
+            Self::Substeps(n) => n,
+            Self::Tolerance { most, .. } => most >> (LEVELS - 1),
+        }
+    }
+
+    /// Most sub-steps that anything gets.
+    pub fn most(&self) -> u32 {
+        match *self {
+            Self::Substeps(n) | Self::Tolerance { most: n, .. } => n,
+        }
+    }
+
+    /// Overlap that may be left, m; below zero where none is measured.
+    pub(crate) fn tolerance(&self) -> f32 {
+        match *self {
+            Self::Substeps(_) => -1.0,
+            Self::Tolerance { penetration, .. } => penetration,
+        }
+    }
+
+    /// Whether it asks which bodies hang together.
+    pub fn is_by_island(&self) -> bool {
+        matches!(self, Self::Tolerance { .. })
+    }
+}
+
+/// What accuracy on demand spent and left, with [`Accuracy::Tolerance`].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Spent {
+    /// Most sub-steps that an island took.
+    pub substeps: u32,
+    /// Visits to contacts in the step: its constraints, each times the sub-steps of its island. Modulo 2^32.
+    pub visits: u32,
+    /// Deepest overlap that the step before left, m, of those awake.
+    pub residual_m: f32,
+    /// Bodies of islands that it left with more than the tolerance.
+    pub bodies_over: u32,
+}
+
+/// Levels of sub-steps that the last few steps wanted.
+#[doc(hidden)]
+#[derive(Debug, Default)]
+pub struct WantedLevels(VecDeque<(u32, u32)>);
+
+impl WantedLevels {
+    /// Takes down what a step that committed wanted.
+    pub fn push(&mut self, control: &Control) {
+        self.0.push_back((control.step, control.levels_wanted));
+        if self.0.len() > 2 * STATUS_DELAY as usize {
+            self.0.pop_front();
+        }
+    }
+
+    /// Those that this step runs: what the one wanted whose report a GPU has by then. So no decision hangs on what has
+    /// arrived. The first steps run the highest, which new worlds want.
+    pub fn of(&self, step: &StepParams) -> u32 {
+        let known = self.0.iter().find(|(number, _)| number + STATUS_DELAY == step.step);
+        let levels = known.map_or(1 << (LEVELS - 1), |(_, levels)| *levels).max(1);
+        if step.tolerance < 0.0 { 1 } else { levels }
+    }
+}

@@ -1,0 +1,73 @@
+//! Stage `level`: how many sub-steps each island gets. Twin of `shaders/level.wgsl`.
+//!
+//! What the last step left is measured where this one finds its contacts: the deepest overlap of each island. Where that
+//! is more than the tolerance the island wants the next level, which has twice the sub-steps; after some calm steps, the
+//! one below. Bodies keep what their islands want, so that islands may meet and part: the most wanted counts.
+
+use crate::batch::{Ends, NO_BODY};
+use crate::island::{self, NO_ISLAND};
+use tumble_core::layout::{BodyState, Control, LEVEL_CALM, LEVEL_HOLD, MOST_CREDIT, Manifold, StepParams};
+
+/// What stands for the overlap of contacts that have none, m; 0 is that of an island without contacts.
+pub const NO_OVERLAP: f32 = 1e-30;
+
+/// What an island wants that wanted `credit` and has this overlap, m.
+pub fn next_credit(credit: u32, overlap: f32, tolerance: f32) -> u32 {
+    if overlap == 0.0 {
+        0
+    } else if overlap > tolerance {
+        ((credit / LEVEL_HOLD + 2) * LEVEL_HOLD - 1).min(MOST_CREDIT)
+    } else if LEVEL_CALM as f32 * overlap < tolerance {
+        credit.saturating_sub(1)
+    } else {
+        credit
+    }
+}
+
+/// Deepest overlap of a manifold, m.
+pub fn overlap(manifold: &Manifold) -> f32 {
+    let points = &manifold.points[..manifold.count as usize];
+    points.iter().fold(NO_OVERLAP, |deepest, point| deepest.max(-point.separation))
+}
+
+/// Decides for each island. Credits are in `states` before and after; `labels`, `manifolds` and `ends` are those of the
+/// step.
+pub fn decide(
+    states: &mut [BodyState],
+    labels: &[u32],
+    manifolds: &[Manifold],
+    ends: &[Ends],
+    step: &StepParams,
+    control: &mut Control,
+) {
+    let mut overlaps = vec![0.0f32; states.len()];
+    let mut credits = vec![0; states.len()];
+    for (state, &label) in states.iter().zip(labels).filter(|(_, label)| **label != NO_ISLAND) {
+        credits[label as usize] = state.credit.max(credits[label as usize]);
+    }
+    let mut deepest = 0.0f32;
+    for (manifold, ends) in manifolds.iter().zip(ends) {
+        let body = if ends.a != NO_BODY { ends.a } else { ends.b };
+        if body != NO_BODY && manifold.count > 0 {
+            let deep = &mut overlaps[labels[body as usize] as usize];
+            *deep = overlap(manifold).max(*deep);
+            deepest = deepest.max(*deep);
+        }
+    }
+    for (state, &label) in states.iter_mut().zip(labels).filter(|(_, label)| **label != NO_ISLAND) {
+        let overlap = overlaps[label as usize];
+        state.credit = next_credit(credits[label as usize], overlap, step.tolerance);
+        control.levels_wanted |= 1 << (state.credit / LEVEL_HOLD);
+        control.levels_used |= 1 << step.level_of(state.credit);
+        control.bodies_over += u32::from(overlap > step.tolerance);
+    }
+    for ends in ends.iter().zip(manifolds).filter_map(|(ends, manifold)| (manifold.count > 0).then_some(ends)) {
+        let body = if ends.a != NO_BODY { ends.a } else { ends.b };
+        if body != NO_BODY {
+            let substeps = step.substeps << step.level_of(states[body as usize].credit);
+            control.visits = control.visits.wrapping_add(substeps);
+        }
+    }
+    control.islands = island::count(labels);
+    control.residual = deepest.to_bits();
+}
