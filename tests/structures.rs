@@ -8,7 +8,7 @@ mod beside;
 mod common;
 
 use beside::{
-    Any, DEEPEST, DRIFT, FASTEST, Held, ON_DEMAND, Plan, SINK, SUBSTEPS, USUAL, all_hold, compare, params, run,
+    Any, DEEPEST, DRIFT, FASTEST, Held, ON_DEMAND, Plan, SINK, SUBSTEPS, USUAL, all_hold, compare, named, params, run,
     substeps, told,
 };
 use tumble::prelude::*;
@@ -20,7 +20,7 @@ fn watch(row: &str, name: &str, scene: Scene, accuracy: Accuracy, limit: f64, st
     let scenes = [scene];
     let plan = Plan { scenes: &scenes, params: params(accuracy), steps: 600, limit, by: &By::ALL, stands };
     let held = [told(SINK), told(DRIFT), Held(DEEPEST, 1.0, 0.1), told(FASTEST)];
-    compare(&Case::new(row, &format!("{name}, {accuracy}, 10 s")), &plan, &held)
+    compare(&Case::new(row, &format!("{name}, {}, 10 s", named(accuracy))), &plan, &held)
 }
 
 /// Two levels stand at the usual 8 sub-steps, three with 16. Five stand in rapier; here they fall with 24, and with 32 on

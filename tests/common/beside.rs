@@ -16,6 +16,14 @@ pub(crate) const USUAL: Accuracy = Accuracy::Substeps(SUBSTEPS);
 /// As many as each island needs for a tenth of a millimetre, 32 at most.
 pub(crate) const ON_DEMAND: Accuracy = Accuracy::Tolerance { penetration: 1e-4, most: 32 };
 
+/// As a case of the table tells it.
+pub(crate) fn named(accuracy: Accuracy) -> String {
+    match accuracy {
+        Accuracy::Tolerance { most, .. } => format!("on demand up to {most}"),
+        _ => accuracy.to_string(),
+    }
+}
+
 /// Our side with this accuracy, on one thread.
 pub(crate) fn params(accuracy: Accuracy) -> Params {
     Params { threads: Some(1), accuracy, ..Params::default() }
