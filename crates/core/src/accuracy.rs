@@ -13,13 +13,15 @@ use std::fmt;
 pub enum Accuracy {
     /// This many sub-steps for everything, 1 to 256.
     Substeps(u32),
-    /// As many as it takes, for each island by itself (bodies that hang together by contacts): the overlap that a step
-    /// leaves is measured at the beginning of the next one, and an island that left more than the tolerance gets twice
-    /// the sub-steps, at once and again and again up to the cap; one that stays below an eighth of it gets half as many
-    /// after 16 steps. So is one that would buckle with fewer. What an island takes is known three steps late, as on a
-    /// GPU. What was spent and what is left: [`StepReport::accuracy`](crate::StepReport::accuracy).
+    /// As many as it takes, for each island by itself (bodies that hang together by contacts). The overlap that a step
+    /// leaves is measured at the beginning of the next one: an island with more than the tolerance gets twice the
+    /// sub-steps, step after step up to the cap; one with less than an eighth of it half as many, after 16 such steps.
+    /// The bodies that a world begins with get all at first, so that structures are built with care. A number of sub-steps
+    /// that no island took is first run three steps after one wants it, when a GPU has told. What was spent and what is
+    /// left: [`StepReport::accuracy`](crate::StepReport::accuracy).
     ///
-    /// Overlap is not all error: what is thrown at a heap overlaps for a while whatever is spent.
+    /// Less time than [`Accuracy::Substeps`] where most is at rest, more while heaps fall: what is thrown at a heap overlaps
+    /// for a while whatever is spent.
     Tolerance {
         /// Deepest overlap that may be left, m; 1e-6 to 1.
         penetration: f32,

@@ -176,16 +176,23 @@ fn params() {
     let good = Params::default();
     good.validate().unwrap();
     let by = |solver| Params { solver, ..good };
+    let within = |accuracy| Params { accuracy, ..good };
     let capacities = |pairs| tumble_core::Capacities { pairs: Some(pairs), ..good.capacities };
     let mut cases = vec![
-        (Params { accuracy: Accuracy::Substeps(0), ..good }, "substeps"),
-        (Params { accuracy: Accuracy::Substeps(257), ..good }, "substeps"),
+        (within(Accuracy::Substeps(0)), "accuracy.substeps"),
+        (within(Accuracy::Substeps(257)), "accuracy.substeps"),
+        (within(Accuracy::Tolerance { penetration: 0.0, most: 32 }), "accuracy.penetration"),
+        (within(Accuracy::Tolerance { penetration: 1.5, most: 32 }), "accuracy.penetration"),
+        (within(Accuracy::Tolerance { penetration: 1e-3, most: 0 }), "accuracy.most"),
+        (within(Accuracy::Tolerance { penetration: 1e-3, most: 12 }), "accuracy.most"),
+        (within(Accuracy::Tolerance { penetration: 1e-3, most: 264 }), "accuracy.most"),
         (Params { threads: Some(0), ..good }, "threads"),
         (Params { capacities: capacities(0), ..good }, "capacities.pairs"),
     ];
     for bad in [NAN, INF, -INF, -1.0] {
         cases.extend([
             (Params { dt: bad, ..good }, "dt"),
+            (within(Accuracy::Tolerance { penetration: bad, most: 32 }), "accuracy.penetration"),
             (by(Solver::Soft(Soft { frequency: bad, ..Soft::default() })), "solver.frequency"),
             (by(Solver::Soft(Soft { static_frequency: bad, ..Soft::default() })), "solver.static_frequency"),
             (by(Solver::Soft(Soft { damping_ratio: bad, ..Soft::default() })), "solver.damping_ratio"),

@@ -1,0 +1,104 @@
+//! Stage `level` alone: what islands want and what is counted, on the CPU and on the GPU in every order of invocations.
+//! Oracle: the mirror; all must agree exactly.
+
+#[path = "common/alone.rs"]
+#[expect(dead_code, reason = "this program uses a part")]
+mod alone;
+mod common;
+#[path = "common/frame.rs"]
+mod frame;
+
+use alone::Alone;
+use frame::{Cpu, control_of, scene_of};
+use tumble_core::layout::*;
+use tumble_core::{Scene, scenes};
+use tumble_cpu::{island, level};
+
+const PERMUTATIONS: [u32; 3] = [0, 1, 2];
+
+/// Bodies that want one thing and another, over contacts some of which overlap by too much.
+fn check(what: &str, scene: &Scene, levels: u32, alone: &mut Alone) {
+    let frame = Cpu::after(scene, 40).plan(false);
+    let (mut states, mut manifolds) = (frame.states.clone(), frame.manifolds.clone());
+    for (i, state) in states.iter_mut().enumerate() {
+        state.credit = [0, 0, 0, 5, 17, 33, 0, 63][i * 7 % 8];
+    }
+    for (i, manifold) in manifolds.iter_mut().enumerate() {
+        let apart = [1e-3, -1e-6, -2e-4, 5e-3, -3e-3][i * 13 % 5];
+        manifold.points.iter_mut().for_each(|point| point.separation = apart);
+    }
+    let step = StepParams { tolerance: 1e-3, levels, substeps: 4, ..frame.step };
+    let labels = island::label(&states, &manifolds, &frame.ends);
+    let mut control = control_of(&frame, false);
+
+    alone.put("step", &[step]);
+    alone.put("counters", &[control]);
+    alone.put("work_states", &states);
+    alone.put("next_pairs", &frame.matched.pairs);
+    alone.put("manifolds", &manifolds);
+    alone.put("aabbs", &frame.aabbs);
+    alone.put("islands", &labels);
+    alone.put("island_credits", &vec![77u32; states.len()]);
+    alone.put("island_overlaps", &vec![77u32; states.len()]);
+    let groups = |count: usize| (count as u32).div_ceil(256) + 1;
+    let (by_pair, by_body) = (groups(manifolds.len()), groups(states.len()));
+    alone.run(|chain| {
+        chain.pass("level", "begin", by_body);
+        chain.pass("level", "ask", by_body);
+        chain.pass("level", "measure", by_pair);
+        chain.pass("level", "decide", by_body);
+        chain.pass("level", "spend", by_pair);
+    });
+
+    level::decide(&mut states, &labels, &manifolds, &frame.ends, &step, &mut control);
+    // That many are counted by the stage before.
+    control.islands = 0;
+    let gpu: Vec<BodyState> = alone.take("work_states");
+    assert!(gpu.iter().map(|s| s.credit).eq(states.iter().map(|s| s.credit)), "{what}: credits");
+    assert!(gpu == states, "{what}: nothing but credits changes");
+    assert_eq!(alone.take::<Control>("counters")[0], control, "{what}: counters");
+}
+
+#[test]
+fn islands_get_what_the_mirrors_get() {
+    for permute in PERMUTATIONS {
+        let mut alone = Alone::new(permute);
+        for bodies in [0, 1, 2, 255, 256, 257, 3000] {
+            check(&format!("{bodies} bodies, order {permute}"), &scene_of(bodies), 0b0101, &mut alone);
+        }
+        for levels in [0b0001, 0b1000, 0b1111] {
+            let what = format!("pyramids, levels {levels:b}, order {permute}");
+            check(&what, &scenes::many_pyramids(9, 5), levels, &mut alone);
+        }
+    }
+}
+
+/// The law of one island. Oracle: what it is told to do.
+#[test]
+fn credit_rises_at_once_and_falls_when_calm() {
+    let tolerance = 1e-3;
+    let next = |credit, overlap| level::next_credit(credit, overlap, tolerance);
+    assert_eq!(next(0, 2e-3), 31, "up a level, with all calm steps to go");
+    assert_eq!(next(16, 2e-3), 47, "and again, however many were left");
+    assert_eq!(next(31, 2e-3), 47);
+    assert_eq!(next(50, 2e-3), 63, "no higher than the highest");
+    assert_eq!(next(63, 2e-3), 63);
+    assert_eq!(next(40, 5e-4), 40, "neither calm nor over");
+    assert_eq!(next(40, 1e-4), 39, "calm");
+    assert_eq!(next(0, 1e-4), 0);
+    assert_eq!(next(63, 0.0), 0, "no contact");
+}
+
+/// Oracle: the law in words.
+#[test]
+fn a_level_that_does_not_run_is_rounded_up() {
+    let used = |levels, wanted: u32| {
+        let step =
+            StepParams { levels, ..tumble_core::Params::default().step_params(1, tumble_core::glam::Vec3::ZERO) };
+        step.level_of(wanted * LEVEL_HOLD + 3)
+    };
+    assert_eq!([0, 1, 2, 3].map(|wanted| used(0b1111, wanted)), [0, 1, 2, 3]);
+    assert_eq!([0, 1, 2, 3].map(|wanted| used(0b0101, wanted)), [0, 2, 2, 2], "up, else the highest there is");
+    assert_eq!([0, 1, 2, 3].map(|wanted| used(0b1000, wanted)), [3, 3, 3, 3]);
+    assert_eq!([0, 1, 2, 3].map(|wanted| used(0b0001, wanted)), [0, 0, 0, 0]);
+}
