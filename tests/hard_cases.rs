@@ -87,6 +87,8 @@ fn friction_is_isotropic() {
         let ways: Vec<f32> = bodies.iter().map(|(out, b)| (poses[*b].translation - *out * 20.0).dot(*out)).collect();
         let (low, high) = ways.iter().fold((f32::MAX, f32::MIN), |(l, h), &w| (l.min(w), h.max(w)));
         row(&case, by, "spread of 12 ways", "m", (high - low).into(), Ask::AtMost(0.01));
+        let mean = f64::from(ways.iter().sum::<f32>()) / 12.0;
+        row(&case, by, "mean of 12 ways", "m", mean, near(400.0 / (2.0 * 0.5 * 9.81), 0.01));
     }
 }
 
