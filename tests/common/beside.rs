@@ -110,7 +110,7 @@ pub(crate) fn run(scene: &Scene, by: By, params: Params, steps: usize, limit: f6
         world.steps(LOOK);
         if limit.is_finite() {
             let (sink, drift) = moved(&world.state().0);
-            if !(sink.max(drift) <= limit) {
+            if sink.max(drift) > limit {
                 let nan = f64::NAN;
                 let fell = step as f64 / 60.0;
                 return End { fell, sink: nan, drift: nan, deepest: nan, mean: nan, fastest: nan, energy: nan };
@@ -226,7 +226,9 @@ pub(crate) fn compare(case: &Case, plan: &Plan, held: &[Held]) -> Vec<String> {
             case.row(by, n(by), name, unit, ours, Ask::Beside(*floor));
             // Where rapier's fell, its number is none and the other bound counts.
             let limit = (share * theirs).max(*most);
-            if by != By::Rapier && plan.stands && !(ours <= limit) {
+            // What is no number holds nothing.
+            let holds = ours <= limit;
+            if by != By::Rapier && plan.stands && !holds {
                 missed.push(format!("{by:?}: {name} {ours} {unit}, more than {limit}"));
             }
         }
