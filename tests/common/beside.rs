@@ -91,6 +91,14 @@ pub(crate) struct End {
     pub(crate) energy: f64,
 }
 
+impl End {
+    fn fallen(step: usize) -> Self {
+        let nan = f64::NAN;
+        let fell = step as f64 / 60.0;
+        Self { fell, sink: nan, drift: nan, deepest: nan, mean: nan, fastest: nan, energy: nan }
+    }
+}
+
 /// Looks between which a fall may go unseen, steps.
 const LOOK: usize = 15;
 
@@ -111,9 +119,7 @@ pub(crate) fn run(scene: &Scene, by: By, params: Params, steps: usize, limit: f6
         if limit.is_finite() {
             let (sink, drift) = moved(&world.state().0);
             if sink.max(drift) > limit {
-                let nan = f64::NAN;
-                let fell = step as f64 / 60.0;
-                return End { fell, sink: nan, drift: nan, deepest: nan, mean: nan, fastest: nan, energy: nan };
+                return End::fallen(step);
             }
         }
     }
@@ -134,8 +140,10 @@ pub(crate) fn run(scene: &Scene, by: By, params: Params, steps: usize, limit: f6
     }
     let (sink, drift) = moved(&poses);
     let fastest = moving.iter().map(|b| f64::from(velocities[*b].linear.length())).fold(0.0, f64::max);
-    let fell = if sink.max(drift) <= limit { f64::INFINITY } else { steps as f64 / 60.0 };
-    End { fell, sink: 1e3 * sink, drift: 1e3 * drift, deepest, mean, fastest: 1e3 * fastest, energy }
+    if sink.max(drift) > limit {
+        return End::fallen(steps - 1);
+    }
+    End { fell: f64::INFINITY, sink: 1e3 * sink, drift: 1e3 * drift, deepest, mean, fastest: 1e3 * fastest, energy }
 }
 
 /// A number of an [`End`].
