@@ -11,7 +11,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tumble_bench::cases::{self, Case};
-use tumble_bench::engines::{self, Contestant, Means};
+use tumble_bench::engines::{self, Contestant, Means, Method};
 use tumble_bench::machine::Machine;
 use tumble_bench::record::{self, Kind, Outcome, Record};
 use tumble_bench::run::{Conditions, Heat, heats};
@@ -43,10 +43,11 @@ struct Args {
     /// Engines, by name, with commas between
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     engines: Vec<String>,
-    /// tumble's solvers, by name, with commas between: one-pass, soft, gauss-seidel, jacobi, penalty. `scaling` and
+    /// tumble's solvers, by name, with commas between: one-pass, soft, gauss-seidel, jacobi, penalty; or within-MM, one pass
+    /// with as many sub-steps as it takes to leave no more than so many millimetres of overlap. `scaling` and
     /// `stages` are measured with the first
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = solver, default_value = "one-pass,soft")]
-    solvers: Vec<Solver>,
+    solvers: Vec<Method>,
     /// Numbers of sub-steps [default: 1,2,4,8,16,32]
     #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=256))]
     substeps: Vec<u32>,
@@ -74,15 +75,24 @@ struct Args {
 }
 
 /// The solver of this name, as it is at first.
-fn solver(name: &str) -> Result<Solver, String> {
-    Ok(match name {
+fn solver(name: &str) -> Result<Method, String> {
+    let within = name.strip_prefix("within-").and_then(|mm| mm.parse::<f32>().ok());
+    let solver = match name {
+        _ if within.is_some() => Solver::default(),
         "one-pass" => Solver::OnePass(OnePass::default()),
         "soft" => Solver::Soft(Soft::default()),
         "gauss-seidel" => Solver::GaussSeidel(GaussSeidel::default()),
         "jacobi" => Solver::Jacobi(Jacobi::default()),
         "penalty" => Solver::Penalty(Penalty::default()),
-        _ => return Err("there are one-pass, soft, gauss-seidel, jacobi and penalty".into()),
-    })
+        _ => {
+            return Err("there are one-pass, soft, gauss-seidel, jacobi, penalty and within-MM, such as within-1".into());
+        }
+    };
+    let method = Method { solver, tolerance: within.map(|mm| 1e-3 * mm) };
+    if !method.fits(8) {
+        return Err("0.001 to 1000 mm may be left".into());
+    }
+    Ok(method)
 }
 
 fn main() -> ExitCode {
@@ -181,8 +191,8 @@ fn measure(args: &Args, machine: Machine, table: &mut Table) -> Result<(), Strin
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     let threads = args.threads.map_or(threads, |n| n as usize);
     let limit = if args.quick { 3.0 } else { args.limit };
-    let (means, solvers) = (Means::new(gpu, args.python.clone()), args.solvers.clone());
-    let conditions = Conditions { means, threads, solvers, limit, machine };
+    let (means, methods) = (Means::new(gpu, args.python.clone()), args.solvers.clone());
+    let conditions = Conditions { means, threads, methods, limit, machine };
     let contestants = contestants(args, &conditions, table)?;
     let all = heats(
         &chosen(args)?,

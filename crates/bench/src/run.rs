@@ -1,12 +1,12 @@
 //! Runs the cases: all engines and settings of a case take turns, so that a noisy machine harms all alike.
 
 use crate::cases::{self, Case, Run};
-use crate::engines::{Contestant, Engine, Facts, Means, Setting};
+use crate::engines::{Contestant, Engine, Facts, Means, Method, Setting};
 use crate::machine::Machine;
 use crate::record::{Kind, Outcome, Record};
 use crate::report::is_ours;
 use glam::Vec3;
-use tumble_core::{Broadphase, Poses, Scene, Solver, Velocities};
+use tumble_core::{Broadphase, Poses, Scene, Velocities};
 
 /// Turns of a heat. The first half is the warm-up: bodies fall, caches fill, buffers grow, pipelines are compiled.
 const ROUNDS: u64 = 20;
@@ -22,8 +22,8 @@ pub struct Conditions {
     pub means: Means,
     /// Threads of every engine on the CPU.
     pub threads: usize,
-    /// tumble's solvers: each runs every case. What has no error is measured with the first.
-    pub solvers: Vec<Solver>,
+    /// tumble's methods: each runs every case. What has no error is measured with the first.
+    pub methods: Vec<Method>,
     /// Seconds that one engine with one setting may step in one heat; past them it is given up as slow.
     pub limit: f64,
     /// Where it runs.
@@ -64,16 +64,20 @@ impl Conditions {
     /// A setting as all engines get it.
     pub fn setting(&self, dt: f64, substeps: u32) -> Setting {
         let (dt, threads) = (dt as f32, self.threads);
-        let solver = self.solvers.first().copied().unwrap_or_default();
-        Setting { dt, substeps, threads, broadphase: Broadphase::Auto, solver, profile: false }
+        let method = self.methods.first().copied().unwrap_or_default();
+        Setting { dt, substeps, threads, broadphase: Broadphase::Auto, method, profile: false }
     }
 
-    /// The setting with each solver that the engine can run with.
-    fn with_solvers(&self, contestant: &Contestant, setting: Setting) -> Vec<Setting> {
-        let choice = if is_ours(contestant.name) { &self.solvers[..] } else { &[] };
+    /// The setting with each method that the engine can run with.
+    fn with_methods(&self, contestant: &Contestant, setting: Setting) -> Vec<Setting> {
+        let choice = if is_ours(contestant.name) { &self.methods[..] } else { &[] };
         match choice {
             [] => vec![setting],
-            solvers => solvers.iter().map(|&solver| Setting { solver, ..setting }).collect(),
+            methods => methods
+                .iter()
+                .filter(|method| method.fits(setting.substeps))
+                .map(|&method| Setting { method, ..setting })
+                .collect(),
         }
     }
 }
@@ -104,7 +108,7 @@ pub fn heats(
             settings.extend(dts.iter().map(|&dt| conditions.setting(dt, SUBSTEPS)));
         }
         for seed in 1..=case.seeds.min(most_seeds) {
-            let all = |&s: &Setting| contestants.iter().map(move |c| (*c, conditions.with_solvers(c, s)));
+            let all = |&s: &Setting| contestants.iter().map(move |c| (*c, conditions.with_methods(c, s)));
             let entries = settings.iter().flat_map(all).flat_map(|(c, all)| all.into_iter().map(move |s| (c, s)));
             let entries = entries.collect();
             heats.push(Heat { case, seed: if case.seeds > 1 { seed } else { 0 }, entries });

@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 use std::cell::RefCell;
 use tumble_bench::cases::{self, Case};
-use tumble_bench::engines::{self, Contestant, Engine, Facts, Make, Means, Refusal, Setting};
+use tumble_bench::engines::{self, Contestant, Engine, Facts, Make, Means, Method, Refusal, Setting};
 use tumble_bench::machine::Machine;
 use tumble_bench::record::{self, Kind, Outcome, Record};
 use tumble_bench::report;
@@ -115,7 +115,7 @@ fn contestant(name: &'static str, make: Make) -> Contestant {
 
 fn conditions() -> Conditions {
     let machine = Machine { name: "a, \"machine\"".into(), commit: "abc+".into(), date: "2026-11-22".into() };
-    Conditions { means: Means::default(), threads: 2, solvers: Vec::new(), limit: 20.0, machine }
+    Conditions { means: Means::default(), threads: 2, methods: Vec::new(), limit: 20.0, machine }
 }
 
 fn column() -> &'static Case {
@@ -224,11 +224,13 @@ fn settings_are_those_asked_for() {
     assert_eq!(heats[0].entries[2].1.dt, 1.0 / 120.0);
 }
 
-/// tumble runs with each solver, and its lines say which, even where it did not start; the others run once.
+/// tumble runs with each method that the setting allows, and its lines say which, even where it did not start; the others run once.
 #[test]
 fn each_solver_runs() {
-    let solvers = vec![Solver::default(), Solver::Soft(Soft::default())];
-    let conditions = Conditions { solvers, ..conditions() };
+    let soft = Method { solver: Solver::Soft(Soft::default()), ..Method::default() };
+    // With sub-steps that are no multiple of 8 there is none.
+    let within = Method { tolerance: Some(1e-3), ..Method::default() };
+    let conditions = Conditions { methods: vec![Method::default(), soft, within], ..conditions() };
     let all = [
         contestant("tumble cpu", good),
         Contestant { most_bodies: 9, ..contestant("tumble gpu", good) },

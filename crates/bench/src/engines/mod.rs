@@ -11,9 +11,10 @@ pub use rapier::RapierWorld;
 
 use crate::record::Outcome;
 use crate::report::is_ours;
+use std::fmt;
 use std::path::PathBuf;
 use std::time::Instant;
-use tumble_core::{Broadphase, Poses, Scene, Solver, StageTime, Velocities};
+use tumble_core::{Accuracy, Broadphase, Params, Poses, Scene, Solver, StageTime, Velocities};
 use tumble_gpu::Gpu;
 
 /// What every engine is told.
@@ -27,10 +28,44 @@ pub struct Setting {
     pub threads: usize,
     /// tumble's broad phase; the others have their own.
     pub broadphase: Broadphase,
-    /// tumble's solver; the others have their own.
-    pub solver: Solver,
+    /// How tumble solves; the others have ways of their own.
+    pub method: Method,
     /// Times the stages too, where the engine can.
     pub profile: bool,
+}
+
+/// How tumble solves.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Method {
+    /// The solver.
+    pub solver: Solver,
+    /// Overlap that may be left, m: then the setting's sub-steps are the most that an island may take, and must be a
+    /// multiple of 8.
+    pub tolerance: Option<f32>,
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.tolerance {
+            Some(tolerance) => write!(f, "{} within {} mm", self.solver, 1e3 * tolerance),
+            None => self.solver.fmt(f),
+        }
+    }
+}
+
+impl Method {
+    /// As the world is told, with so many sub-steps.
+    pub fn accuracy(&self, substeps: u32) -> Accuracy {
+        match self.tolerance {
+            Some(penetration) => Accuracy::Tolerance { penetration, most: substeps },
+            None => Accuracy::Substeps(substeps),
+        }
+    }
+
+    /// Whether there is such an accuracy.
+    pub fn fits(&self, substeps: u32) -> bool {
+        Params { accuracy: self.accuracy(substeps), ..Params::default() }.validate().is_ok()
+    }
 }
 
 /// What engines run on, besides the CPU.
@@ -197,7 +232,7 @@ pub const ALL: &[Contestant] = &[
 impl Contestant {
     /// The solver that it is to run with, as in the table; empty where there is no choice.
     pub fn solver(&self, setting: &Setting) -> String {
-        if is_ours(self.name) { setting.solver.to_string() } else { String::new() }
+        if is_ours(self.name) { setting.method.to_string() } else { String::new() }
     }
 
     /// Makes the scene in the engine, if it may have so many bodies.

@@ -2,7 +2,7 @@
 
 use super::{Engine, Facts, Means, Refusal, Setting, timed};
 use tumble::prelude::*;
-use tumble_core::{Accuracy, Scene, StageTime, Velocities};
+use tumble_core::{Scene, StageTime, Velocities};
 
 /// Position, rotation, both velocities.
 const BYTES_A_BODY: u64 = 4 * (3 + 4 + 3 + 3);
@@ -23,10 +23,10 @@ pub(super) fn has_gpu(means: &Means) -> Result<(), String> {
 fn params(setting: &Setting) -> Params {
     Params {
         dt: setting.dt,
-        accuracy: Accuracy::Substeps(setting.substeps),
+        accuracy: setting.method.accuracy(setting.substeps),
         threads: Some(setting.threads),
         broadphase: setting.broadphase,
-        solver: setting.solver,
+        solver: setting.method.solver,
         profile: setting.profile,
         ..Params::default()
     }
@@ -70,7 +70,7 @@ impl Engine for Ours {
             version: env!("CARGO_PKG_VERSION").into(),
             adapter: report.adapter,
             broadphase: self.asked.broadphase.to_string(),
-            solver: self.asked.solver.to_string(),
+            solver: self.asked.method.to_string(),
             differs: Vec::new(),
             floor_bytes: Some(
                 2 * (BYTES_A_BODY * u64::from(report.bodies) + BYTES_A_POINT * u64::from(report.contacts)),
