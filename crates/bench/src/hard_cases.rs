@@ -188,13 +188,20 @@ pub fn merge(folder: &Path, out: &Path, closing: &str) -> Result<(), String> {
         let mut last = "";
         for row in rows.iter().filter(|row| row.section == letter) {
             let Line { case, quantity, unit, exact, asked, substeps, .. } = &row.first;
-            let [cpu, gpu] = By::OURS.map(|by| row.cell(by, "not run"));
-            let [ratio, exact] = [row.ratio(), *exact].map(|value| value.map(number).unwrap_or_default());
-            let (rapier, verdict) = (row.cell(By::Rapier, ""), row.verdict());
+            // Where there is an exact value, three digits would not tell how near the others are.
+            let shown = if exact.is_some() { fine } else { number };
+            let [cpu, gpu] = By::OURS.map(|by| row.cell(by, "not run", shown));
+            let [ratio, exact] = [row.ratio().map(number), exact.map(shown)].map(Option::unwrap_or_default);
+            let (rapier, verdict) = (row.cell(By::Rapier, "", shown), row.verdict());
             let theirs = row.by(By::Rapier).map_or(String::new(), |line| line.substeps.to_string());
-            let known = [title, case, quantity, unit, &cpu, &gpu, &rapier, &ratio, &exact, asked];
+            let plain = |by| row.cell(by, "", |value| value.to_string());
+            let [plain_cpu, plain_gpu, plain_rapier] = By::ALL.map(plain);
+            let [plain_ratio, plain_exact] =
+                [row.ratio(), row.first.exact].map(|value| value.map(|value| value.to_string()).unwrap_or_default());
+            let known = [title, case, quantity, unit, &plain_cpu, &plain_gpu, &plain_rapier];
+            let known = known.into_iter().chain([plain_ratio.as_str(), &plain_exact, asked]);
             let rest = [&substeps.to_string(), &theirs, verdict.trim_matches('*'), &machine, &commit, &date];
-            table.write_record(known.into_iter().chain(rest)).map_err(|e| told(&e))?;
+            table.write_record(known.chain(rest)).map_err(|e| told(&e))?;
             let named = if case == last { "" } else { case };
             let quantity = if unit == "1" { quantity.clone() } else { format!("{quantity}, {unit}") };
             let substeps = if theirs.is_empty() { substeps.to_string() } else { format!("{substeps} / {theirs}") };
@@ -205,6 +212,16 @@ pub fn merge(folder: &Path, out: &Path, closing: &str) -> Result<(), String> {
     }
     table.flush().map_err(|e| told(&e))?;
     std::fs::write(out.join("hard_cases.md"), text + "\n" + closing).map_err(|e| told(&e))
+}
+
+/// Up to five digits behind the point.
+fn fine(value: f64) -> String {
+    let text = format!("{value:.5}");
+    if value != 0.0 && value.abs() < 0.01 {
+        number(value)
+    } else {
+        text.trim_end_matches('0').trim_end_matches('.').into()
+    }
 }
 
 fn read(folder: &Path) -> Result<Vec<Row>, String> {
@@ -233,11 +250,11 @@ impl Row {
         self.lines.iter().find(|line| line.by == by)
     }
 
-    fn cell(&self, by: By, missing: &str) -> String {
+    fn cell(&self, by: By, missing: &str, told: impl Fn(f64) -> String) -> String {
         self.by(by).map_or(missing.into(), |line| match line.value {
             v if v.is_nan() => "fell".into(),
             v if v.is_infinite() => "stands".into(),
-            v => number(v),
+            v => told(v),
         })
     }
 
@@ -249,8 +266,9 @@ impl Row {
     /// Of errors, which are better when they are smaller.
     fn ratio(&self) -> Option<f64> {
         let (theirs, _) = (self.by(By::Rapier)?.value, self.first.floor?);
-        let worst = self.ours().map(|ours| ours / theirs).fold(f64::MIN, f64::max);
-        (worst.is_finite() && !self.ours().any(f64::is_nan)).then_some(worst)
+        let ratios: Vec<f64> = self.ours().map(|ours| ours / theirs).collect();
+        // Of what fell, and of nothing over nothing, there is none.
+        if ratios.iter().all(|ratio| ratio.is_finite()) { ratios.into_iter().reduce(f64::max) } else { None }
     }
 
     fn verdict(&self) -> &'static str {
@@ -315,6 +333,7 @@ mod tests {
         assert_eq!(beside(1.0, 11.5, 10.0), ("**worse**", Some(1.15)));
         assert_eq!(beside(1.0, f64::NAN, 10.0), ("**falls**", None));
         assert_eq!(beside(1.0, 1.0, f64::NAN), ("rapier's falls", None));
+        assert_eq!(beside(0.0, 0.0, 0.0), ("a tenth", None));
         assert_eq!(row(Some(true), None, &[(By::Cpu, 1.0), (By::Rapier, 9.0)]).verdict(), "held");
         assert_eq!(row(Some(false), None, &[(By::Gpu, 1.0)]).verdict(), "**missed on the GPU**");
         assert_eq!(row(None, None, &[(By::Cpu, 1.0)]).verdict(), "told");
