@@ -85,7 +85,9 @@ fn solver(name: &str) -> Result<Method, String> {
         "jacobi" => Solver::Jacobi(Jacobi::default()),
         "penalty" => Solver::Penalty(Penalty::default()),
         _ => {
-            return Err("there are one-pass, soft, gauss-seidel, jacobi, penalty and within-MM, such as within-1".into());
+            return Err(
+                "there are one-pass, soft, gauss-seidel, jacobi, penalty and within-MM, such as within-1".into()
+            );
         }
     };
     let method = Method { solver, tolerance: within.map(|mm| 1e-3 * mm) };

@@ -237,6 +237,15 @@ fn tail(@builtin(local_invocation_index) lid: u32) {
     }
 }
 
+// What constraints are sorted by: those of one batch by their points, so that those solved side by side have as many; but
+// the last batch, which is solved in sequence, not.
+fn sort_key(batch: u32, points: u32) -> u32 {
+    if batch == UNBATCHED {
+        return UNBATCHED;
+    }
+    return 4u * batch + select(4u - min(points, 4u), 0u, batch == LAST_BATCH);
+}
+
 @compute @workgroup_size(256)
 fn finish(
     @builtin(workgroup_id) wg: vec3<u32>,
@@ -253,7 +262,7 @@ fn finish(
         pair_batch[i] = LAST_BATCH;
         join(ends(i), LAST_BATCH);
     }
-    batch_keys[i] = batch;
+    batch_keys[i] = sort_key(batch, manifolds[i].count);
     batch_order[i] = i;
 }
 
@@ -279,13 +288,14 @@ fn degree(
     }
 }
 
-// The first of the sorted keys that is no lower than the batch; UNBATCHED, which is above all, ends the last batch.
+// The first of the sorted keys that is no lower than the batch's; UNBATCHED, which is above all, ends the last batch.
 fn first_of(batch: u32) -> u32 {
     var low = 0u;
     var high = atomicLoad(&counters[CONTROL_PAIR_COUNT]);
+    let lowest = min(4u * batch, UNBATCHED);
     for (var turn = 0u; turn < 32u && low < high; turn++) {
         let middle = low + (high - low) / 2u;
-        if batch_keys[middle] < batch {
+        if batch_keys[middle] < lowest {
             low = middle + 1u;
         } else {
             high = middle;

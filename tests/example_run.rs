@@ -12,14 +12,16 @@ use std::process::{Command, Output};
 use tumble::core::{measures, scenes};
 use tumble::{Accuracy, Backend, Broadphase, Params, World};
 
-const FIELDS: [&str; 21] = [
+const FIELDS: [&str; 23] = [
     "scene",
     "backend",
     "adapter",
     "bodies",
     "steps",
     "dt",
+    "accuracy",
     "substeps",
+    "spent",
     "ms_per_step",
     "passes",
     "pairs",
@@ -54,6 +56,25 @@ fn error_line(output: &Output) -> &str {
 
 fn keys(value: &Value) -> Vec<&str> {
     value.as_object().unwrap().keys().map(String::as_str).collect()
+}
+
+/// Oracle: the same run through the library.
+#[test]
+fn a_tolerance_is_kept_and_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("run.json");
+    let arguments = ["pyramid", "--bodies", "55", "--steps", "120", "--backend", "cpu", "--tolerance", "0.0005"];
+    let output = run(&[&arguments[..], &["--json", file.to_str().unwrap()]].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let json: Value = serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
+    let accuracy = Accuracy::Tolerance { penetration: 5e-4, most: 32 };
+    let scene = scenes::pyramid(10);
+    let mut world = World::new(scene, Params { accuracy, ..Params::default() }, Backend::Cpu).unwrap();
+    (0..120).for_each(|_| world.step().unwrap());
+    let spent = world.sync().unwrap().accuracy.unwrap();
+    assert_eq!(json["spent"]["visits"], spent.visits);
+    assert_eq!(json["spent"]["substeps"], spent.substeps);
+    assert!(text(&output.stdout).contains("sub-steps on the mean"), "{}", text(&output.stdout));
 }
 
 #[test]
@@ -131,10 +152,11 @@ fn json_has_the_documented_fields() {
         assert_eq!(json[field], count, "{field}");
     }
     assert!(report.contacts > 0);
+    assert_eq!((&json["accuracy"], &json["spent"]), (&"3 sub-steps".into(), &Value::Null));
     assert_eq!(json["broadphase"], "grid");
     assert!(json["broadphase_bytes_per_body"].as_f64().unwrap() > 10.0);
     assert_eq!((&json["scene"], &json["backend"]), (&"pile".into(), &"cpu".into()));
-    assert!(json["adapter"].as_str().unwrap().contains("2 threads"));
+    assert!(json["adapter"].as_str().unwrap().contains(" lanes, 2 threads"));
     assert_eq!(json["dt"].as_f64().unwrap() as f32, 0.01);
     assert!(keys(&json["growths"]).is_empty());
     let (median, p95) = (json["ms_per_step"]["median"].as_f64().unwrap(), json["ms_per_step"]["p95"].as_f64().unwrap());
@@ -163,7 +185,7 @@ fn runs_on_an_adapter() {
 
 #[test]
 fn bad_arguments_are_refused_in_one_line() {
-    let cases: [(&[&str], &[&str]); 28] = [
+    let cases: [(&[&str], &[&str]); 31] = [
         (&[], &["no scene", "pile", "pyramid", "hub"]),
         (&["pyramd"], &["'pyramd'", "pile", "balls", "mixed", "column", "hub", "similar", "'pyramid'"]),
         (&["pile", "--bodies", "0"], &["'0'", "--bodies", "1 to 5000000"]),
@@ -180,6 +202,9 @@ fn bad_arguments_are_refused_in_one_line() {
         (&["pile", "--dt", "fast"], &["'fast'", "--dt"]),
         (&["pile", "--substeps", "0"], &["'0'", "--substeps", "1 to 256"]),
         (&["pile", "--substeps", "257"], &["'257'", "--substeps", "1 to 256"]),
+        (&["pile", "--tolerance", "0"], &["accuracy.penetration is 0", "1e-6 to 1 m"]),
+        (&["pile", "--tolerance", "NaN"], &["accuracy.penetration is NaN", "1e-6 to 1 m"]),
+        (&["pile", "--tolerance", "0.001", "--substeps", "12"], &["accuracy.most is 12", "a multiple of 8"]),
         (&["pile", "--threads", "0"], &["'0'", "--threads", "1 to 1024"]),
         (&["pile", "--backend", "metal"], &["'metal'", "--backend", "auto", "cpu", "gpu"]),
         (&["pile", "--broadphase", "sweep"], &["'sweep'", "--broadphase", "auto", "grid"]),

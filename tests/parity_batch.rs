@@ -169,7 +169,11 @@ impl Graph {
         let (rounds, batch_count, max_degree) = (cpu.rounds, cpu.batch_count, cpu.max_degree);
         let expected = [rounds, batch_count, max_degree, last_count, constraints as u32, 0];
         assert_eq!(told(&gpu.control), expected, "{what}: rounds, batches, degree, last, solved, unplaced");
-        assert_eq!(bytemuck::cast_ref::<_, [u32; 120]>(&gpu.control)[NEXT_COLORED_AS], colored_as, "{what}");
+        assert_eq!(
+            bytemuck::cast_ref::<_, [u32; size_of::<Control>() / 4]>(&gpu.control)[NEXT_COLORED_AS],
+            colored_as,
+            "{what}"
+        );
         let stop = last_count > self.step.last_limit;
         let raised = [gpu.control.stop, gpu.control.overflow, gpu.control.needed];
         assert_eq!(raised, if stop { [1, overflow::LAST_BATCH, last_count] } else { [0; 3] }, "{what}");

@@ -68,7 +68,7 @@ fn begin_copies_states_and_clears_counters() {
             alone.put("masks", &vec![GARBAGE; 2 * bodies]);
             alone.put("claims", &vec![GARBAGE; bodies]);
             alone.put("class_histogram", &[GARBAGE; CLASSES]);
-            alone.put("counters", &[GARBAGE; 120]);
+            alone.put("counters", &[GARBAGE; size_of::<Control>() / 4]);
             alone.run(|chain| chain.pass("edit", "begin", (bodies.max(CLASSES) as u32).div_ceil(256)));
             assert!(alone.take::<BodyState>("work_states") == crowd.states, "{bodies} bodies");
             assert!(alone.take::<u32>("masks").iter().all(|&word| word == 0));
@@ -227,7 +227,7 @@ fn boxes_are_the_same_and_counted() {
         let mut alone = Alone::new(permute);
         for bodies in SIZES {
             let crowd = Crowd::new(bodies, 6);
-            let mut control = [0; 120];
+            let mut control = [0; size_of::<Control>() / 4];
             control[CENTER_MIN..CENTER_MIN + 3].fill(u32::MAX);
             alone.put("step", &[crowd.step]);
             alone.put("counters", &control);

@@ -171,7 +171,7 @@ fn commit(chain: &mut Chain) {
     chain.pass("contact", "commit_counts", 1);
 }
 
-fn set_control(alone: &mut Alone, change: impl FnOnce(&mut [u32; 120])) {
+fn set_control(alone: &mut Alone, change: impl FnOnce(&mut [u32; size_of::<Control>() / 4])) {
     let mut words = bytemuck::cast(alone.take::<Control>("counters")[0]);
     change(&mut words);
     alone.put("counters", &[bytemuck::cast::<_, Control>(words)]);

@@ -55,7 +55,7 @@ pub struct StepReport {
     pub step: u64,
     /// `cpu` or `gpu`.
     pub backend: &'static str,
-    /// The adapter and driver, or the instruction set and threads of the CPU side.
+    /// The adapter and driver, or the instruction set, lanes and threads of the CPU side.
     pub adapter: String,
     /// Bodies in the scene.
     pub bodies: u32,

@@ -34,7 +34,7 @@ pub const NO_BODY: u32 = u32::MAX;
 pub struct Batches {
     /// Batch of each pair, some of 64 numbers; [`UNBATCHED`] when it does not touch.
     pub of_pair: Vec<u32>,
-    /// Pair of each constraint, batch by batch, in pair order within one.
+    /// Pair of each constraint, batch by batch; within one those with most points first, then in pair order.
     pub order: Vec<u32>,
     /// First constraint of each batch, and the end. Here batches that nobody is in come behind the others, but before
     /// the last one.
@@ -158,7 +158,7 @@ pub fn place(
         of_pair[i as usize] = LAST_BATCH;
         join(&mut masks, ends[i as usize], LAST_BATCH);
     }
-    let (order, start, batch_count) = sort_by_batch(&of_pair);
+    let (order, start, batch_count) = sort_by_batch(&of_pair, manifolds);
     let max_degree = masks.iter().map(|m| m.count_ones()).max().unwrap_or(0);
     Batches { of_pair, order, start, masks, rounds, batch_count, max_degree }
 }
@@ -221,18 +221,26 @@ fn wanted(masks: &[u64], ends: Ends, round: u32, batching: u32) -> u32 {
     }
 }
 
-/// Stable counting sort of the touching pairs by batch: their order, the starts of batches, how many are in use.
-fn sort_by_batch(of_pair: &[u32]) -> (Vec<u32>, Vec<u32>, u32) {
-    let mut start = vec![0u32; BATCHES as usize + 1];
-    for &batch in of_pair.iter().filter(|&&b| b != UNBATCHED) {
-        start[batch as usize] += 1;
-    }
-    let total = crate::primitives::exclusive_scan(&mut start);
-    let mut cursor = start.clone();
+/// What constraints are sorted by: those of one batch by their points, so that those solved side by side have as many; but
+/// the last batch, which is solved in sequence, not.
+fn sort_key(batch: u32, points: u32) -> usize {
+    (4 * batch + if batch == LAST_BATCH { 0 } else { 4 - points }) as usize
+}
+
+/// Stable counting sort of the touching pairs: their order, the starts of batches, how many are in use.
+fn sort_by_batch(of_pair: &[u32], manifolds: &[Manifold]) -> (Vec<u32>, Vec<u32>, u32) {
+    let mut cursor = vec![0u32; 4 * BATCHES as usize + 1];
+    let keys = || {
+        let touching = of_pair.iter().zip(manifolds).enumerate().filter(|(_, (batch, _))| **batch != UNBATCHED);
+        touching.map(|(i, (&batch, manifold))| (i, sort_key(batch, manifold.count)))
+    };
+    keys().for_each(|(_, key)| cursor[key] += 1);
+    let total = crate::primitives::exclusive_scan(&mut cursor);
+    let mut start: Vec<u32> = cursor.iter().step_by(4).copied().collect();
     let mut order = vec![0u32; total as usize];
-    for (i, &batch) in of_pair.iter().enumerate().filter(|(_, b)| **b != UNBATCHED) {
-        order[cursor[batch as usize] as usize] = i as u32;
-        cursor[batch as usize] += 1;
+    for (i, key) in keys() {
+        order[cursor[key] as usize] = i as u32;
+        cursor[key] += 1;
     }
     // Those that nobody is in go to the end.
     let mut used = 0;

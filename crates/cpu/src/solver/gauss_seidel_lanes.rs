@@ -1,13 +1,20 @@
 //! The law of `gauss_seidel`, several constraints at a time: the same operations in the same order, so the same
 //! results.
 
-use super::lanes::{BodyLanes, ConstraintLanes, HeadLanes, Lane, PointLanes};
+use super::lanes::{BodyLanes, ConstraintLanes, HeadLanes, PointLanes};
 use super::push_lanes::{apply, arms, count, push_tangent, separation};
+use super::simd::Lanes;
 use tumble_core::layout::StepParams;
 
 /// One visit to the constraints of a group.
 #[inline(always)]
-pub(super) fn visit(last: bool, c: &mut ConstraintLanes, a: &mut BodyLanes, b: &mut BodyLanes, step: &StepParams) {
+pub(super) fn visit<L: Lanes>(
+    last: bool,
+    c: &mut ConstraintLanes<L>,
+    a: &mut BodyLanes<L>,
+    b: &mut BodyLanes<L>,
+    step: &StepParams,
+) {
     let (head, points) = c.split();
     for p in points.iter_mut() {
         push_normal(head, p, p.normal_mass, a, b, step);
@@ -21,27 +28,27 @@ pub(super) fn visit(last: bool, c: &mut ConstraintLanes, a: &mut BodyLanes, b: &
 }
 
 #[inline(always)]
-pub(super) fn push_normal(
-    head: &HeadLanes,
-    p: &mut PointLanes,
-    mass: Lane,
-    a: &mut BodyLanes,
-    b: &mut BodyLanes,
+pub(super) fn push_normal<L: Lanes>(
+    head: &HeadLanes<L>,
+    p: &mut PointLanes<L>,
+    mass: L,
+    a: &mut BodyLanes<L>,
+    b: &mut BodyLanes<L>,
     step: &StepParams,
 ) {
     let (normal, [ra, rb]) = (head.normal, arms(head, p));
     let velocity = normal.dot(b.velocity_at(rb) - a.velocity_at(ra));
     let separation = separation(head, p, a, b);
-    let beyond = (separation + Lane::splat(step.slop)).fast_min(Lane::ZERO);
-    let pull = (head.bias_rate * beyond).fast_max(Lane::splat(-step.push_speed));
-    let gap = separation * Lane::splat(step.inverse_h);
-    let bias = separation.simd_gt(Lane::ZERO).bitselect(gap, pull);
+    let beyond = (separation + L::splat(step.slop)).fast_min(L::ZERO);
+    let pull = (head.bias_rate * beyond).fast_max(L::splat(-step.push_speed));
+    let gap = separation * L::splat(step.inverse_h);
+    let bias = separation.simd_gt(L::ZERO).bitselect(gap, pull);
     let sum = p.normal - mass * (velocity + bias);
-    let new = sum.fast_max(Lane::ZERO);
+    let new = sum.fast_max(L::ZERO);
     let good = sum.is_finite();
     let push = good & (new - p.normal);
     p.normal = good.bitselect(new, p.normal);
     apply(a, b, ra, rb, push * normal);
-    let first = good & p.normal.simd_eq(Lane::ZERO) & p.total[0].simd_eq(Lane::ZERO);
+    let first = good & p.normal.simd_eq(L::ZERO) & p.total[0].simd_eq(L::ZERO);
     p.approach = first.bitselect(p.approach.fast_min(velocity), p.approach);
 }

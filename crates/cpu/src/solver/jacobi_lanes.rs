@@ -1,21 +1,22 @@
 //! The law of `jacobi`, several constraints at a time: the same operations in the same order, so the same results.
 
 use super::gauss_seidel_lanes::push_normal;
-use super::lanes::{BodyLanes, ConstraintLanes, HeadLanes, LANES, Lane, NO_BODY, PointLanes, ROWS, START, V3};
+use super::lanes::{BodyLanes, ConstraintLanes, HeadLanes, NO_BODY, PointLanes, ROWS, START};
 use super::push_lanes::{arms, count, push_tangent};
+use super::simd::{Lanes, V3};
 use crate::shared::Shared;
 use tumble_core::layout::StepParams;
 use wide::f32x4;
 
 /// One visit to the constraints of a group; what it leaves of their parts of the bodies, split into `parts`.
 #[inline(always)]
-pub(super) fn visit(
+pub(super) fn visit<L: Lanes>(
     last: bool,
-    c: &mut ConstraintLanes,
-    [a, b]: [&BodyLanes; 2],
-    parts: [Lane; 2],
+    c: &mut ConstraintLanes<L>,
+    [a, b]: [&BodyLanes<L>; 2],
+    parts: [L; 2],
     step: &StepParams,
-) -> [BodyLanes; 2] {
+) -> [BodyLanes<L>; 2] {
     let (head, points) = c.split();
     let (mut part_a, mut part_b) = (part(a, parts[0]), part(b, parts[1]));
     for p in points.iter_mut() {
@@ -36,7 +37,7 @@ pub(super) fn visit(
 }
 
 #[inline(always)]
-fn part(body: &BodyLanes, parts: Lane) -> BodyLanes {
+fn part<L: Lanes>(body: &BodyLanes<L>, parts: L) -> BodyLanes<L> {
     let mut part = *body;
     part.inverse_mass = body.inverse_mass * parts;
     part.inertia_diagonal = parts * body.inertia_diagonal;
@@ -45,20 +46,23 @@ fn part(body: &BodyLanes, parts: Lane) -> BodyLanes {
 }
 
 #[inline(always)]
-fn share(head: &HeadLanes, p: &PointLanes, [a, b]: [&BodyLanes; 2], parts: [&BodyLanes; 2]) -> Lane {
+fn share<L: Lanes>(head: &HeadLanes<L>, p: &PointLanes<L>, [a, b]: [&BodyLanes<L>; 2], parts: [&BodyLanes<L>; 2]) -> L {
     let [ra, rb] = arms(head, p);
-    let yields = |body: &BodyLanes, r: V3| {
-        let turn = r.cross(head.normal);
-        body.inverse_mass + turn.dot(body.inverse_inertia_times(turn))
-    };
-    (yields(a, ra) + yields(b, rb)) / (yields(parts[0], ra) + yields(parts[1], rb))
+    let n = head.normal;
+    (yields(a, ra, n) + yields(b, rb, n)) / (yields(parts[0], ra, n) + yields(parts[1], rb, n))
+}
+
+#[inline(always)]
+fn yields<L: Lanes>(body: &BodyLanes<L>, r: V3<L>, normal: V3<L>) -> L {
+    let turn = r.cross(normal);
+    body.inverse_mass + turn.dot(body.inverse_inertia_times(turn))
 }
 
 /// How many parts each body is split into.
 #[inline(always)]
-pub(super) fn parts(read: impl Fn(usize) -> f32x4, index: [u32; LANES]) -> Lane {
-    let mut parts = Lane::ZERO;
-    for (lane, &i) in index.iter().enumerate().filter(|(_, i)| **i != NO_BODY) {
+pub(super) fn parts<L: Lanes>(read: impl Fn(usize) -> f32x4, index: L::Indices) -> L {
+    let mut parts = L::ZERO;
+    for (lane, &i) in index.as_ref().iter().enumerate().filter(|(_, i)| **i != NO_BODY) {
         parts.as_mut_array()[lane] = read(ROWS * i as usize + START).as_array()[3];
     }
     parts
@@ -69,19 +73,18 @@ pub(super) fn parts(read: impl Fn(usize) -> f32x4, index: [u32; LANES]) -> Lane 
 /// # Safety
 /// No other thread touches any of those bodies meanwhile.
 #[inline(always)]
-pub(super) unsafe fn add_change(
-    body: &BodyLanes,
-    part: &BodyLanes,
-    parts: Lane,
+pub(super) unsafe fn add_change<L: Lanes>(
+    body: &BodyLanes<L>,
+    part: &BodyLanes<L>,
+    parts: L,
     bodies: &Shared<'_, f32x4>,
-    index: [u32; LANES],
+    index: L::Indices,
 ) {
-    let over = |v: V3| V3::new(v.x / parts, v.y / parts, v.z / parts);
-    let changes = [over(part.linear - body.linear), over(part.angular - body.angular)];
-    for (lane, i) in index.into_iter().enumerate() {
+    let changes = [(part.linear - body.linear) / parts, (part.angular - body.angular) / parts];
+    for (lane, &i) in index.as_ref().iter().enumerate() {
         if body.inverse_mass.as_array()[lane] > 0.0 {
             for (row, change) in changes.iter().enumerate() {
-                let at = |l: Lane| l.as_array()[lane];
+                let at = |l: L| l.as_array()[lane];
                 let row = ROWS * i as usize + START + row;
                 // SAFETY: the caller's promise.
                 let start = unsafe { bodies.get(row) };

@@ -16,8 +16,11 @@
 //!
 //! Bounces come last.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
 mod gauss_seidel;
 mod gauss_seidel_lanes;
+mod groups;
 mod jacobi;
 mod jacobi_lanes;
 mod lanes;
@@ -32,6 +35,7 @@ mod push;
 mod push_lanes;
 mod resist;
 mod resist_lanes;
+mod simd;
 mod soft;
 mod soft_lanes;
 pub mod store;
@@ -39,21 +43,19 @@ pub mod store;
 use crate::bounds::moves;
 use crate::math::tangents;
 use crate::motion;
-use lanes::{ConstraintLanes, LANES};
+use groups::Groups;
 use prepare::Contact;
-use rayon::prelude::*;
 use store::Solved;
 use tumble_core::layout::{
     BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Impulse, LAST_BATCH, SolverBody, StepParams,
     solver,
 };
-use wide::f32x4;
 
-/// The constraints of a step. Batches lie in groups of four side by side, the last one in plain rows.
+/// The constraints of a step. Batches lie in groups of constraints side by side, the last one in plain rows.
 #[derive(Default)]
 pub struct Rows {
     /// Groups, batch by batch; a batch's last group may have empty lanes.
-    groups: Vec<ConstraintLanes>,
+    groups: Groups,
     /// First group of each batch but the last, and the end.
     group_start: Vec<usize>,
     /// First constraint of each group, and how many it has.
@@ -118,6 +120,13 @@ pub struct Bodies<'a> {
 }
 
 impl Rows {
+    /// Rows with so many constraints side by side instead of the most that the processor takes; none if that is not a
+    /// number that it takes. Results are the same.
+    #[doc(hidden)]
+    pub fn with_lanes(lanes: usize) -> Option<Self> {
+        Some(Self { groups: Groups::with_lanes(lanes)?, ..Self::default() })
+    }
+
     /// Builds the rows of all constraints; `contact(c)` gives what constraint c of `start`'s order is made of. Buffers
     /// are used again.
     pub fn build<'c>(
@@ -133,29 +142,12 @@ impl Rows {
         self.members.clear();
         for batch in 0..LAST_BATCH as usize {
             self.group_start.push(self.members.len());
-            for first in (start[batch]..start[batch + 1]).step_by(LANES) {
-                self.members.push((first, (start[batch + 1] - first).min(LANES as u32)));
+            for first in (start[batch]..start[batch + 1]).step_by(self.groups.lanes()) {
+                self.members.push((first, (start[batch + 1] - first).min(self.groups.lanes() as u32)));
             }
         }
         self.group_start.push(self.members.len());
-        self.groups.resize(self.members.len(), ConstraintLanes::empty());
-        let rows = bytemuck::cast_slice::<SolverBody, f32x4>(bodies);
-        self.groups.par_iter_mut().zip(&self.members).with_min_len(32).for_each(|(group, &(first, count))| {
-            *group = ConstraintLanes::empty();
-            for lane in 0..count as usize {
-                let contact = contact(first as usize + lane);
-                let manifold = contact.manifold;
-                group.set_head(
-                    lane,
-                    &prepare::prepare_head(&contact, colliders, bodies, states, step),
-                    manifold.between,
-                );
-                for point in 0..manifold.count as usize {
-                    group.set_point(lane, point, &manifold.points[point], prepare::carry(&contact, point));
-                }
-            }
-            prepare_lanes::prepare(group, rows);
-        });
+        self.groups.build(&self.members, colliders, bodies, states, step, &contact);
         let last = start[LAST_BATCH as usize] as usize..start[LAST_BATCH as usize + 1] as usize;
         self.last_first = last.start;
         self.last =
@@ -164,19 +156,20 @@ impl Rows {
 
     /// Calls `take(c, solved)` for every constraint, from many threads at once.
     pub fn for_each_constraint(&self, take: impl Fn(usize, &Solved) + Sync) {
-        self.groups.par_iter().zip(&self.members).with_min_len(64).for_each(|(group, &(first, count))| {
-            for lane in 0..count as usize {
-                take(first as usize + lane, &group.solved(lane));
-            }
-        });
+        self.groups.for_each_constraint(&self.members, &take);
         for c in 0..self.last.heads.len() {
             take(self.last_first + c, &self.last.solved(c));
         }
     }
 
+    /// Constraints side by side.
+    pub(crate) fn lanes(&self) -> usize {
+        self.groups.lanes()
+    }
+
     /// Bytes that the rows hold.
     pub(crate) fn bytes(&self) -> u64 {
-        (self.groups.capacity() * (size_of::<ConstraintLanes>() + 8)) as u64
+        self.groups.bytes() + (self.members.capacity() * size_of::<(u32, u32)>()) as u64
     }
 }
 

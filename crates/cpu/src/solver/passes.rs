@@ -1,9 +1,10 @@
-//! The passes of a step over rows in groups of four, by all threads inside one parallel section.
+//! The passes of a step over rows in groups side by side, by all threads inside one parallel section.
 //!
 //! A sweep is a stage a batch, since batches may share bodies. Batches too small to be cut lie one behind the other and
 //! are worked off as one block: handing each to the next thread costs more than it gives.
 
-use super::lanes::{BodyLanes, ConstraintLanes, Lane, Weights};
+use super::lanes::{BodyLanes, ConstraintLanes, Weights};
+use super::simd::Lanes;
 use super::{
     Bodies, Pass, Rows, Visit, gauss_seidel_lanes, jacobi_lanes, one_pass_lanes, penalty_lanes, soft_lanes, takes_part,
 };
@@ -64,7 +65,7 @@ pub(super) fn run(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, passes
     }
     let body_blocks = blocks(all.len(), BODIES);
     let counts: Vec<u32> = stages.iter().map(|(_, part)| part.map_or(body_blocks, |part| part.blocks)).collect();
-    let groups = Shared::new(&mut rows.groups);
+    let groups = rows.groups.shared();
     let last = Mutex::new(&mut rows.last);
     let bodies = Shared::new(solver);
     run_stages(&counts, |stage, block| match stages[stage] {
@@ -80,7 +81,7 @@ pub(super) fn run(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, passes
         (Pass::Sweep(visit), Some(part)) => {
             let range = block_of(&part.groups, block, part.blocks);
             // SAFETY: blocks of a stage share no group.
-            sweep(unsafe { groups.slice_mut(range) }, &bodies.rows(), step, visit);
+            unsafe { groups.sweep(range, &bodies.rows(), step, visit) };
             if part.last {
                 // SAFETY: a part with the last batch has this block alone.
                 let bodies = unsafe { bodies.slice_mut(all.clone()) };
@@ -93,28 +94,41 @@ pub(super) fn run(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, passes
 
 /// One visit to each group, in order. The groups of one batch share no moving body (`batch`), so threads may have some
 /// each.
-fn sweep(groups: &mut [ConstraintLanes], bodies: &Shared<'_, f32x4>, step: &StepParams, visit: Visit) {
-    // The visit is a constant in each of these loops.
-    match visit {
-        Visit::WarmStart => groups.iter_mut().for_each(|group| visit_group(Visit::WarmStart, group, bodies, step)),
-        Visit::Solve => groups.iter_mut().for_each(|group| visit_group(Visit::Solve, group, bodies, step)),
-        Visit::Relax => groups.iter_mut().for_each(|group| visit_group(Visit::Relax, group, bodies, step)),
-        Visit::Load => groups.iter_mut().for_each(|group| visit_group(Visit::Load, group, bodies, step)),
-        Visit::Pass => groups.iter_mut().for_each(|group| visit_group(Visit::Pass, group, bodies, step)),
-        Visit::GaussSeidel => groups.iter_mut().for_each(|group| visit_group(Visit::GaussSeidel, group, bodies, step)),
-        Visit::LastGaussSeidel => {
-            groups.iter_mut().for_each(|group| visit_group(Visit::LastGaussSeidel, group, bodies, step))
-        }
-        Visit::Split => groups.iter_mut().for_each(|group| visit_group(Visit::Split, group, bodies, step)),
-        Visit::Jacobi => groups.iter_mut().for_each(|group| visit_group(Visit::Jacobi, group, bodies, step)),
-        Visit::LastJacobi => groups.iter_mut().for_each(|group| visit_group(Visit::LastJacobi, group, bodies, step)),
-        Visit::Penalty => groups.iter_mut().for_each(|group| visit_group(Visit::Penalty, group, bodies, step)),
-        Visit::Restitution => groups.iter_mut().for_each(|group| visit_group(Visit::Restitution, group, bodies, step)),
+pub(super) fn sweep<L: Lanes>(
+    groups: &mut [ConstraintLanes<L>],
+    bodies: &Shared<'_, f32x4>,
+    step: &StepParams,
+    visit: Visit,
+) {
+    L::run(
+        #[inline(always)]
+        || match visit {
+            // The visit is a constant in each of these loops.
+            Visit::WarmStart => visit_all(Visit::WarmStart, groups, bodies, step),
+            Visit::Solve => visit_all(Visit::Solve, groups, bodies, step),
+            Visit::Relax => visit_all(Visit::Relax, groups, bodies, step),
+            Visit::Load => visit_all(Visit::Load, groups, bodies, step),
+            Visit::Pass => visit_all(Visit::Pass, groups, bodies, step),
+            Visit::GaussSeidel => visit_all(Visit::GaussSeidel, groups, bodies, step),
+            Visit::LastGaussSeidel => visit_all(Visit::LastGaussSeidel, groups, bodies, step),
+            Visit::Split => visit_all(Visit::Split, groups, bodies, step),
+            Visit::Jacobi => visit_all(Visit::Jacobi, groups, bodies, step),
+            Visit::LastJacobi => visit_all(Visit::LastJacobi, groups, bodies, step),
+            Visit::Penalty => visit_all(Visit::Penalty, groups, bodies, step),
+            Visit::Restitution => visit_all(Visit::Restitution, groups, bodies, step),
+        },
+    );
+}
+
+#[inline(always)]
+fn visit_all<L: Lanes>(visit: Visit, groups: &mut [ConstraintLanes<L>], bodies: &Shared<'_, f32x4>, step: &StepParams) {
+    for group in groups {
+        visit_group(visit, group, bodies, step);
     }
 }
 
 #[inline(always)]
-fn visit_group(visit: Visit, group: &mut ConstraintLanes, bodies: &Shared<'_, f32x4>, step: &StepParams) {
+fn visit_group<L: Lanes>(visit: Visit, group: &mut ConstraintLanes<L>, bodies: &Shared<'_, f32x4>, step: &StepParams) {
     let moved = !matches!(visit, Visit::WarmStart | Visit::Split | Visit::Restitution);
     // SAFETY: no other thread moves these bodies meanwhile: constraints of one batch share none that moves, a part of
     // several batches is one block, and bodies that do not move are never written (`scatter`).
@@ -146,7 +160,7 @@ fn visit_group(visit: Visit, group: &mut ConstraintLanes, bodies: &Shared<'_, f3
             gauss_seidel_lanes::visit(visit == Visit::LastGaussSeidel, group, &mut a, &mut b, step);
         }
         Visit::Split => {
-            let one = || Weights { weight: Lane::ONE, weighted: Lane::ZERO };
+            let one = || Weights { weight: L::ONE, weighted: L::ZERO };
             // SAFETY: as above.
             unsafe { a.weigh(bodies, ia, one()) };
             // SAFETY: as above.
@@ -165,9 +179,9 @@ fn visit_group(visit: Visit, group: &mut ConstraintLanes, bodies: &Shared<'_, f3
         Visit::Penalty => {
             let [after_a, after_b] = penalty_lanes::visit(group, &a, &b);
             // SAFETY: as above.
-            unsafe { jacobi_lanes::add_change(&a, &after_a, Lane::ONE, bodies, ia) };
+            unsafe { jacobi_lanes::add_change(&a, &after_a, L::ONE, bodies, ia) };
             // SAFETY: as above.
-            unsafe { jacobi_lanes::add_change(&b, &after_b, Lane::ONE, bodies, ib) };
+            unsafe { jacobi_lanes::add_change(&b, &after_b, L::ONE, bodies, ib) };
             return;
         }
         Visit::Restitution => group.bounce(&mut a, &mut b, step),

@@ -1,11 +1,17 @@
 //! What the laws of `push` do, several constraints at a time: the same operations in the same order, so the same results.
 
-use super::lanes::{BodyLanes, HeadLanes, Lane, PointLanes, V3};
+use super::lanes::{BodyLanes, HeadLanes, PointLanes};
 use super::resist_lanes;
+use super::simd::{Lanes, V3};
 use tumble_core::layout::StepParams;
 
 #[inline(always)]
-pub(super) fn warm_start(head: &HeadLanes, points: &[PointLanes], a: &mut BodyLanes, b: &mut BodyLanes) {
+pub(super) fn warm_start<L: Lanes>(
+    head: &HeadLanes<L>,
+    points: &[PointLanes<L>],
+    a: &mut BodyLanes<L>,
+    b: &mut BodyLanes<L>,
+) {
     let (normal, [t1, t2]) = (head.normal, head.tangents);
     for p in points {
         let push = p.normal * normal + p.tangent[0] * t1 + p.tangent[1] * t2;
@@ -17,13 +23,13 @@ pub(super) fn warm_start(head: &HeadLanes, points: &[PointLanes], a: &mut BodyLa
 
 /// From the bodies' centres of mass to one point of each.
 #[inline(always)]
-pub(super) fn arms(head: &HeadLanes, p: &PointLanes) -> [V3; 2] {
+pub(super) fn arms<L: Lanes>(head: &HeadLanes<L>, p: &PointLanes<L>) -> [V3<L>; 2] {
     [p.anchor, p.anchor - head.between]
 }
 
 /// Counts a sub-step's impulses.
 #[inline(always)]
-pub(super) fn count(p: &mut PointLanes) {
+pub(super) fn count<L: Lanes>(p: &mut PointLanes<L>) {
     p.total[0] += p.normal;
     p.total[1] += p.tangent[0];
     p.total[2] += p.tangent[1];
@@ -31,7 +37,7 @@ pub(super) fn count(p: &mut PointLanes) {
 
 /// Gaps at one point of each.
 #[inline(always)]
-pub(super) fn separation(head: &HeadLanes, p: &PointLanes, a: &BodyLanes, b: &BodyLanes) -> Lane {
+pub(super) fn separation<L: Lanes>(head: &HeadLanes<L>, p: &PointLanes<L>, a: &BodyLanes<L>, b: &BodyLanes<L>) -> L {
     let [ra, rb] = arms(head, p);
     let (core_a, core_b) = (ra - head.round_a * head.normal, rb - head.round_b * head.normal);
     let moved = b.translation - a.translation + b.turned(core_b) - a.turned(core_a);
@@ -39,7 +45,12 @@ pub(super) fn separation(head: &HeadLanes, p: &PointLanes, a: &BodyLanes, b: &Bo
 }
 
 #[inline(always)]
-pub(super) fn push_tangent(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLanes, b: &mut BodyLanes) {
+pub(super) fn push_tangent<L: Lanes>(
+    head: &HeadLanes<L>,
+    p: &mut PointLanes<L>,
+    a: &mut BodyLanes<L>,
+    b: &mut BodyLanes<L>,
+) {
     let ([t1, t2], [ra, rb]) = (head.tangents, arms(head, p));
     let slide = b.velocity_at(rb) - a.velocity_at(ra);
     let [u, v] = head.surface_velocity;
@@ -47,7 +58,7 @@ pub(super) fn push_tangent(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLan
     let y = p.tangent[1] - p.tangent_mass * (t2.dot(slide) + v);
     let length = (x * x + y * y).sqrt();
     let most = head.friction * p.normal;
-    let scale = length.simd_gt(most).bitselect(most / length, Lane::ONE);
+    let scale = length.simd_gt(most).bitselect(most / length, L::ONE);
     let (x, y) = (x * scale, y * scale);
     let push = (x - p.tangent[0]) * t1 + (y - p.tangent[1]) * t2;
     let good = push.x.is_finite() & push.y.is_finite() & push.z.is_finite();
@@ -57,15 +68,21 @@ pub(super) fn push_tangent(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLan
 }
 
 #[inline(always)]
-pub(super) fn bounce(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLanes, b: &mut BodyLanes, step: &StepParams) {
+pub(super) fn bounce<L: Lanes>(
+    head: &HeadLanes<L>,
+    p: &mut PointLanes<L>,
+    a: &mut BodyLanes<L>,
+    b: &mut BodyLanes<L>,
+    step: &StepParams,
+) {
     let (restitution, normal) = (head.restitution, head.normal);
-    let threshold = Lane::splat(-step.restitution_threshold);
-    let bounces = restitution.simd_gt(Lane::ZERO) & !p.approach.simd_gt(threshold) & p.total[0].simd_gt(Lane::ZERO);
+    let threshold = L::splat(-step.restitution_threshold);
+    let bounces = restitution.simd_gt(L::ZERO) & !p.approach.simd_gt(threshold) & p.total[0].simd_gt(L::ZERO);
     let [ra, rb] = arms(head, p);
     let velocity = normal.dot(b.velocity_at(rb) - a.velocity_at(ra));
     let change = -p.normal_mass * (velocity + restitution * p.approach);
     let sum = p.normal + change;
-    let new = sum.fast_max(Lane::ZERO);
+    let new = sum.fast_max(L::ZERO);
     let push = new - p.normal;
     let good = bounces & sum.is_finite();
     p.normal = good.bitselect(new, p.normal);
@@ -74,7 +91,7 @@ pub(super) fn bounce(head: &HeadLanes, p: &mut PointLanes, a: &mut BodyLanes, b:
 }
 
 #[inline(always)]
-pub(super) fn apply(a: &mut BodyLanes, b: &mut BodyLanes, ra: V3, rb: V3, push: V3) {
+pub(super) fn apply<L: Lanes>(a: &mut BodyLanes<L>, b: &mut BodyLanes<L>, ra: V3<L>, rb: V3<L>, push: V3<L>) {
     a.linear = a.linear - a.inverse_mass * push;
     a.angular = a.angular - a.inverse_inertia_times(ra.cross(push));
     b.linear = b.linear + b.inverse_mass * push;

@@ -60,7 +60,9 @@ impl World {
             value: threads.to_string(),
             allowed: "a number of threads that the system can start",
         })?;
-        let adapter = format!("{}, {} threads", std::env::consts::ARCH, pool.current_num_threads());
+        let rows = Rows::default();
+        let (lanes, threads) = (rows.lanes(), pool.current_num_threads());
+        let adapter = format!("{}, {lanes} lanes, {threads} threads", std::env::consts::ARCH);
         let mut kept = Kept {
             control: Control::zeroed(),
             poses: packed.states.iter().zip(&packed.props).map(|(s, p)| PoseRecord::of(s, p)).collect(),
@@ -73,7 +75,7 @@ impl World {
             impulses: Vec::new(),
             memory: Vec::new(),
             found: Vec::new(),
-            rows: Rows::default(),
+            rows,
             asleep: Asleep::default(),
         };
         let (bodies, colliders) = (kept.states.len() as u32, kept.colliders.len() as u32);
