@@ -1,20 +1,17 @@
-//! Cases with a formula, on both sides. Oracle: analysis, unless a test says otherwise. Each prints its row; see them
-//! all with `cargo test --release --test hard_cases -- --nocapture --test-threads 1`.
+//! Cases with a formula, on both sides. Oracle: analysis, unless a test says otherwise. Each prints its rows; see them all
+//! with `cargo test --release --test hard_cases -- --nocapture --test-threads 1`, and the table of all cases in
+//! `docs/results/*/hard_cases.md`.
 
+#[expect(dead_code, reason = "this program uses a part")]
+#[path = "common/beside.rs"]
+mod beside;
 mod common;
 
+use beside::{Any, SUBSTEPS, ours, substeps};
 use std::f32::consts::PI;
 use tumble::prelude::*;
-use tumble_core::{Accuracy, measures, scenes};
-
-/// Runs `case` on the CPU and on the GPU.
-fn on_both(case: impl Fn(&str, &dyn Fn(Scene, Params) -> World)) {
-    case("cpu", &|scene, params| World::new(scene, params, Backend::Cpu).expect("a valid scene"));
-    case("gpu", &|scene, params| {
-        let world = tumble_gpu::World::with_gpu(common::gpu().clone(), scene, params).expect("a valid scene");
-        World::Gpu(Box::new(world))
-    });
-}
+use tumble_bench::hard_cases::{Ask, By, Case};
+use tumble_core::{measures, scenes};
 
 fn run(world: &mut World, steps: usize) {
     for _ in 0..steps {
@@ -22,57 +19,57 @@ fn run(world: &mut World, steps: usize) {
     }
 }
 
-fn row(case: &str, side: &str, measured: f64, exact: f64, within: &str) {
-    println!("{case:<44} {side}  {measured:>12.6}  exact {exact:>12.6}  within {within}");
+/// Records a number of one of our sides with its usual sub-steps, and asserts what is asked of it.
+#[track_caller]
+fn row(case: &Case, by: By, quantity: &str, unit: &str, value: f64, ask: Ask) {
+    assert!(case.row(by, SUBSTEPS, quantity, unit, value, ask), "{by:?}: {quantity}: {value} {unit} for {ask:?}");
 }
 
-fn near(case: &str, side: &str, measured: f64, exact: f64, relative: f64) {
-    row(case, side, measured, exact, &format!("{:.3} %", relative * 100.0));
-    let error = (measured - exact).abs();
-    assert!(error <= relative * exact.abs(), "{case} on {side}: {measured} for {exact}, off by {error}");
+/// Within so large a share of the exact value.
+fn near(exact: f64, relative: f64) -> Ask {
+    Ask::Near(exact, relative * exact.abs())
 }
 
 #[test]
 fn free_fall_and_projectile() {
-    on_both(|side, make| {
-        for velocity in [Vec3::ZERO, Vec3::new(8.0, 12.0, -3.0)] {
+    let case = Case::new("A01", "free fall and projectile, 1 s");
+    for by in By::OURS {
+        for (name, velocity) in [("free fall", Vec3::ZERO), ("projectile", Vec3::new(8.0, 12.0, -3.0))] {
             let (scene, body) = scenes::free_fall(velocity);
-            let mut world = make(scene, Params::default());
+            let mut world = ours(by, scene, Params::default());
             run(&mut world, 60);
             let end = world.poses().expect("poses")[body].translation.as_dvec3();
             let exact = velocity.as_dvec3() + glam::DVec3::new(0.0, -9.81 / 2.0, 0.0);
-            near("free fall / projectile, path after 1 s, m", side, end.length(), exact.length(), 1e-5);
-            assert!((end - exact).length() <= 1e-5 * exact.length(), "{end} for {exact}");
+            row(&case, by, &format!("{name}, path"), "m", end.length(), near(exact.length(), 1e-5));
+            let off = (end - exact).length() / exact.length();
+            row(&case, by, &format!("{name}, error over path"), "1", off, Ask::AtMost(1e-5));
         }
-    });
+    }
 }
 
 #[test]
 fn sliding_box_stops_where_friction_says() {
-    on_both(|side, make| {
+    let case = Case::new("A02", "sliding box, 6 m/s");
+    for by in By::OURS {
         for mu in [0.2f32, 0.4, 0.7] {
-            for degrees in [0.0f32, 35.0] {
+            for degrees in [0.0f32, 35.0, 160.0] {
                 let (sin, cos) = degrees.to_radians().sin_cos();
                 let (scene, body) = scenes::sliding_box(mu, 6.0 * Vec3::new(cos, 0.0, sin));
-                let mut world = make(scene, Params::default());
+                let mut world = ours(by, scene, Params::default());
                 run(&mut world, (6.0 / (mu * 9.81) * 60.0) as usize + 30);
                 let end = world.poses().expect("poses")[body].translation;
-                let way = (end.x * end.x + end.z * end.z).sqrt();
-                near(
-                    &format!("sliding box, mu {mu}, {degrees} deg, m"),
-                    side,
-                    way.into(),
-                    (36.0 / (2.0 * mu * 9.81)).into(),
-                    0.01,
-                );
+                let way = f64::from(end.x.hypot(end.z));
+                let exact = 36.0 / (2.0 * f64::from(mu) * 9.81);
+                row(&case, by, &format!("way, mu {mu}, {degrees} degrees"), "m", way, near(exact, 0.01));
             }
         }
-    });
+    }
 }
 
 #[test]
 fn friction_is_isotropic() {
-    on_both(|side, make| {
+    let case = Case::new("A03", "friction every 30 degrees, 20 m/s");
+    for by in By::OURS {
         // The scene has nothing but directions: one box each, far apart.
         let mut scene = Scene::new();
         scene.insert(RigidBodyBuilder::fixed(), ColliderBuilder::halfspace(Vec3::Y).friction(0.5));
@@ -84,43 +81,46 @@ fn friction_is_isotropic() {
                 (out, scene.insert(body, ColliderBuilder::cuboid(0.5, 0.25, 0.5).friction(0.5)).body)
             })
             .collect();
-        let mut world = make(scene, Params::default());
+        let mut world = ours(by, scene, Params::default());
         run(&mut world, 290);
         let poses = world.poses().expect("poses");
         let ways: Vec<f32> = bodies.iter().map(|(out, b)| (poses[*b].translation - *out * 20.0).dot(*out)).collect();
         let (low, high) = ways.iter().fold((f32::MAX, f32::MIN), |(l, h), &w| (l.min(w), h.max(w)));
-        row("friction isotropy, spread of 12 ways, m", side, (high - low).into(), 0.0, "0.01 m");
-        assert!(high - low <= 0.01, "ways from {low} to {high}: {ways:?}");
-    });
+        row(&case, by, "spread of 12 ways", "m", (high - low).into(), Ask::AtMost(0.01));
+        let mean = f64::from(ways.iter().sum::<f32>()) / 12.0;
+        row(&case, by, "mean of 12 ways", "m", mean, near(400.0 / (2.0 * 0.5 * 9.81), 0.01));
+    }
 }
 
+/// Half a degree on either side of the angle.
 #[test]
 fn ramp_slips_from_its_angle() {
-    on_both(|side, make| {
+    let case = Case::new("A04", "ramp, way in 2 s");
+    for by in By::OURS {
         for mu in [0.1f32, 0.3, 0.5, 0.7, 1.0] {
-            for (off, slips) in [(-0.5f32, false), (0.5, true)] {
+            for (off, ask) in [(-0.5f32, Ask::AtMost(0.05)), (0.5, Ask::AtLeast(0.05))] {
                 let angle = mu.atan() + off.to_radians();
                 let (scene, body) = scenes::ramp(mu, angle);
-                let mut world = make(scene, Params::default());
+                let mut world = ours(by, scene, Params::default());
                 // A box in doubt has 3 s to show: at half a degree above it slips at 0.08 m/s².
                 run(&mut world, 60);
                 let before = world.poses().expect("poses")[body].translation;
                 run(&mut world, 120);
                 let way = (world.poses().expect("poses")[body].translation - before).length();
-                row(&format!("ramp, mu {mu}, {off:+} deg, way in 2 s, m"), side, way.into(), 0.0, "slips above 0.05");
-                assert_eq!(way > 0.05, slips, "mu {mu}, {off} degrees off on {side}: {way} m in 2 s");
+                row(&case, by, &format!("mu {mu}, {off:+} degrees"), "m", way.into(), ask);
             }
         }
-    });
+    }
 }
 
 #[test]
 fn restitution_gives_back_its_share() {
-    on_both(|side, make| {
+    let case = Case::new("A05", "restitution, ball from 5 m");
+    for by in By::OURS {
         for e in [0.5f32, 0.8, 1.0] {
             let height = 5.0f32;
             let (scene, body) = scenes::bouncing_ball(e, height);
-            let mut world = make(scene, Params::default());
+            let mut world = ours(by, scene, Params::default());
             let (mut lowest_seen, mut peak) = (false, 0.0f32);
             for _ in 0..260 {
                 world.step().expect("step");
@@ -135,18 +135,19 @@ fn restitution_gives_back_its_share() {
                 }
             }
             // Between steps the true top is at most g dt² / 8 higher.
-            near(&format!("restitution {e}, height, m"), side, peak.into(), (e * e * height).into(), 0.02);
+            row(&case, by, &format!("height, e {e}"), "m", peak.into(), near((e * e * height).into(), 0.02));
             assert!(e < 1.0 || peak <= height, "e = 1 gained {} m", peak - height);
         }
-    });
+    }
 }
 
 #[test]
 fn ball_slips_then_rolls() {
-    on_both(|side, make| {
+    let case = Case::new("A06", "slip to roll, dt 1/240 s");
+    for by in By::OURS {
         let (mu, speed) = (0.3f32, 5.0f32);
         let (scene, body) = scenes::slip_to_roll(mu, speed);
-        let mut world = make(scene, Params { dt: 1.0 / 240.0, ..Params::default() });
+        let mut world = ours(by, scene, Params { dt: 1.0 / 240.0, ..Params::default() });
         let mut rolls = None;
         for step in 1..400 {
             world.step().expect("step");
@@ -157,18 +158,49 @@ fn ball_slips_then_rolls() {
             }
         }
         let end = world.velocities().expect("velocities")[body].linear.x;
-        near("slip to roll, final speed, m/s", side, end.into(), (speed * 5.0 / 7.0).into(), 0.005);
+        row(&case, by, "final speed", "m/s", end.into(), near((speed * 5.0 / 7.0).into(), 0.005));
         // A step is 0.9 % of the time, and slip must fall below 0.1 % of the speed: one step of grace.
         let exact = f64::from(2.0 * speed / (7.0 * mu * 9.81));
-        near("slip to roll, time, s", side, rolls.expect("it rolls in the end"), exact, 0.005 + 1.0 / 240.0 / exact);
-    });
+        let ask = near(exact, 0.005 + 1.0 / 240.0 / exact);
+        row(&case, by, "time", "s", rolls.expect("it rolls in the end"), ask);
+    }
+}
+
+/// Oracle: analysis. The floor's friction is 0.4 (M + 25 m) g = 137 N against the motion. A ball is pulled at its lowest
+/// point alone, so m a = f and 2/5 m r w' = f, and where it does not slip 7/2 a is the box's: its 25 are as 50/7 of their
+/// masses. A pyramid of friction, 97 N along x and along z and so 194 N in all, would hold the box.
+#[test]
+fn a_box_is_pulled_from_under_balls() {
+    let case = Case::new("A07", "box pulled by 150 N under 25 balls");
+    let pull = 150.0 * Vec3::new(1.0, 0.0, 1.0).normalize();
+    let gains = (150.0 - 0.4 * 35.0 * 9.81) / (10.0 + 50.0 / 7.0);
+    for by in By::OURS {
+        let (scene, pulled, balls) = scenes::pulled_box();
+        let mut world = ours(by, scene, Params::default());
+        let along = |v: &Velocity| f64::from(v.linear.dot(pull) / 150.0);
+        let mut speeds = Vec::new();
+        for step in 0..=120 {
+            if step == 30 || step == 120 {
+                let v = world.velocities().expect("velocities");
+                let ball = balls.iter().map(|b| along(&v[*b])).sum::<f64>() / 25.0;
+                speeds.push([along(&v[pulled]), ball]);
+            }
+            world.edit().add_force(pulled, pull).expect("a living body");
+            run(&mut world, 1);
+        }
+        for (i, (name, exact)) in [("box", gains), ("balls, mean", 2.0 / 7.0 * gains)].into_iter().enumerate() {
+            let gained = (speeds[1][i] - speeds[0][i]) / 1.5;
+            row(&case, by, &format!("{name}, acceleration"), "m/s²", gained, near(exact, 0.05));
+        }
+    }
 }
 
 #[test]
 fn free_box_keeps_momentum_and_energy() {
-    on_both(|side, make| {
+    let case = Case::new("A08", "free box 1 x 2 x 3, 10 s");
+    for by in By::OURS {
         let (scene, _) = scenes::free_box();
-        let mut world = make(scene.clone(), Params::default());
+        let mut world = ours(by, scene.clone(), Params::default());
         let state = |world: &mut World| {
             let (poses, velocities) = (world.poses().expect("poses"), world.velocities().expect("velocities"));
             let momentum = measures::angular_momentum(&scene, &poses, &velocities);
@@ -178,165 +210,67 @@ fn free_box_keeps_momentum_and_energy() {
         run(&mut world, 600);
         let (l1, e1) = state(&mut world);
         let drift = (l1 - l0).length() / l0.length();
-        row("free box 10 s, angular momentum, relative", side, drift, 0.0, "1 %");
-        row("free box 10 s, energy, relative", side, e1 / e0 - 1.0, 0.0, "1 %");
-        assert!(drift < 0.01 && (e1 / e0 - 1.0).abs() < 0.01);
-    });
+        row(&case, by, "angular momentum, change", "1", drift, Ask::AtMost(0.01));
+        row(&case, by, "energy, change", "1", (e1 / e0 - 1.0).abs(), Ask::AtMost(0.01));
+    }
 }
 
+/// Oracle: analysis for the linear momentum; for the angular one rapier too, which must not keep it better by more than
+/// 10 % and a rounding error, 1e-5 m.
 #[test]
 fn closed_system_keeps_momentum() {
-    on_both(|side, make| {
-        let drifts: Vec<f64> = [60.0f32, 240.0]
-            .into_iter()
-            .map(|rate| {
-                let scene = scenes::closed_system(120);
-                let mut world = make(scene.clone(), Params { dt: 1.0 / rate, ..Params::default() });
-                let state = |world: &mut World| {
-                    let (poses, velocities) = (world.poses().expect("poses"), world.velocities().expect("velocities"));
-                    let p = measures::linear_momentum(&scene, &velocities);
-                    (p, measures::angular_momentum(&scene, &poses, &velocities))
-                };
-                let scale: f64 = {
-                    let velocities = world.velocities().expect("velocities");
-                    let mass = |b| f64::from(scene.mass_properties(b).expect("living").mass);
-                    scene.bodies().map(|b| mass(b) * f64::from(velocities[b].linear.length())).sum()
-                };
-                let (p0, l0) = state(&mut world);
-                run(&mut world, 2 * rate as usize);
-                let (p1, l1) = state(&mut world);
-                let linear = (p1 - p0).length() / scale;
-                row(&format!("closed system, dt 1/{rate}, linear / sum |p|"), side, linear, 0.0, "1e-6");
-                assert!(linear < 1e-6, "linear momentum drifts by {linear}");
-                (l1 - l0).length() / scale
-            })
-            .collect();
-        row("closed system, angular, dt 1/60, m", side, drifts[0], 0.0, "");
-        row("closed system, angular, dt 1/240, m", side, drifts[1], 0.0, "falls with dt");
-        assert!(drifts[1] < drifts[0] && drifts[0] < 1e-2, "{drifts:?}");
-    });
+    let case = Case::new("A09", "closed system of 120 mixed bodies, 2 s");
+    let scene = scenes::closed_system(120);
+    let mut drifts = Vec::new();
+    for by in By::ALL {
+        for rate in [60.0f32, 240.0] {
+            let mut world = Any::new(by, &scene, Params { dt: 1.0 / rate, ..Params::default() });
+            let momenta = |world: &mut Any| {
+                let (poses, velocities) = world.state();
+                let angular = measures::angular_momentum(&scene, &poses, &velocities);
+                (measures::linear_momentum(&scene, &velocities), angular)
+            };
+            let mass = |b| f64::from(scene.mass_properties(b).expect("living").mass);
+            let speeds = measures::initial_velocities(&scene);
+            let scale: f64 = scene.bodies().map(|b| mass(b) * f64::from(speeds[b].linear.length())).sum();
+            let (p0, l0) = momenta(&mut world);
+            world.steps(2 * rate as usize);
+            let (p1, l1) = momenta(&mut world);
+            let (linear, angular) = ((p1 - p0).length() / scale, (l1 - l0).length() / scale);
+            let (n, ask) = (substeps(by, SUBSTEPS), if by == By::Rapier { Ask::Said } else { Ask::AtMost(1e-6) });
+            let held = case.row(by, n, &format!("linear over sum of abs(p), dt 1/{rate} s"), "1", linear, ask);
+            assert!(held, "{by:?}: linear momentum drifts by {linear}");
+            case.row(by, n, &format!("angular over sum of abs(p), dt 1/{rate} s"), "m", angular, Ask::Beside(1e-5));
+            drifts.push(angular);
+        }
+    }
+    let [cpu, gpu, rapier] = [&drifts[..2], &drifts[2..4], &drifts[4..]];
+    for ours in [cpu, gpu] {
+        assert!(ours[1] < ours[0] && ours[0] < 1e-2, "it falls with dt: {drifts:?}");
+        assert!(ours.iter().zip(rapier).all(|(o, t)| *o <= 1.1 * t + 1e-5), "rapier's is better: {drifts:?}");
+    }
 }
 
+/// Momentum stays; how much goes with the last ball is what one pass of restitution reaches: less than the nine tenths
+/// that are asked, since it cannot pass a blow along.
 #[test]
 fn cradle_hands_on_its_speed() {
-    on_both(|side, make| {
-        for gap in [1e-3f32, 0.0] {
+    let case = Case::new("A10", "Newton's cradle, 5 balls, e = 1");
+    for by in By::ALL {
+        for (gap, name) in [(1e-3f32, "1 mm"), (0.0, "0")] {
             let (scene, balls) = scenes::cradle(1.0, gap);
-            let mut world = make(scene, Params::default());
-            run(&mut world, 90);
-            let velocities = world.velocities().expect("velocities");
+            let mut world = Any::new(by, &scene, Params::default());
+            world.steps(90);
+            let velocities = world.state().1;
             let speeds: Vec<f32> = balls.iter().map(|b| velocities[*b].linear.x).collect();
-            row(&format!("cradle, gap {gap} m, last ball, m/s"), side, speeds[4].into(), 1.0, "said, not asserted");
-            // Momentum stays; how much goes with the last ball is what one pass of restitution reaches.
-            assert!((speeds.iter().sum::<f32>() - 1.0).abs() < 1e-4, "{speeds:?}");
-            assert!(speeds.iter().map(|v| v * v).sum::<f32>() <= 1.0 + 1e-4, "energy gained: {speeds:?}");
-        }
-    });
-}
-
-#[test]
-fn a_bullet_stops_at_a_thin_wall() {
-    on_both(|side, make| {
-        let (scene, body) = scenes::bullet();
-        let mut world = make(scene, Params::default());
-        run(&mut world, 30);
-        let x = world.poses().expect("poses")[body].translation.x;
-        row("bullet 200 m/s, 0.1 m wall, x, m", side, x.into(), -0.15, "stays before");
-        assert!(x < -0.1, "the bullet is at {x}");
-    });
-}
-
-#[test]
-fn overlap_leaves_slowly() {
-    on_both(|side, make| {
-        let (scene, bodies) = scenes::overlap_cube();
-        let mut world = make(scene, Params::default());
-        let mut fastest = 0.0f32;
-        for _ in 0..60 {
-            world.step().expect("step");
-            let velocities = world.velocities().expect("velocities");
-            fastest = bodies.iter().map(|b| velocities[*b].linear.length()).fold(fastest, f32::max);
-        }
-        row("25 % overlap, fastest, m/s", side, fastest.into(), 3.0, "at most");
-        assert!(fastest <= 3.0, "a body left at {fastest} m/s");
-    });
-}
-
-#[test]
-fn odd_parameters_stay_finite() {
-    on_both(|side, make| {
-        let odd = [(1.0 / 15.0, 4), (1.0 / 240.0, 4), (1.0 / 60.0, 1), (1.0 / 60.0, 32)];
-        for (dt, substeps) in odd {
-            for gravity in [0.0f32, 9.81, 1000.0] {
-                let mut scene = scenes::mixed(40);
-                scene.gravity = Vec3::new(0.0, -gravity, 0.0);
-                let mut world =
-                    make(scene.clone(), Params { dt, accuracy: Accuracy::Substeps(substeps), ..Params::default() });
-                run(&mut world, 40);
-                let (poses, velocities) = (world.poses().expect("poses"), world.velocities().expect("velocities"));
-                let energy = measures::kinetic_energy(&scene, &poses, &velocities);
-                let report = world.sync().expect("report");
-                row(&format!("dt {dt:.4}, {substeps} sub-steps, g {gravity}, J"), side, energy, 0.0, "finite");
-                assert!(energy.is_finite() && report.quarantined == 0 && report.lost == 0, "{report}");
+            let n = substeps(by, SUBSTEPS);
+            let ask = if by == By::Rapier { Ask::Said } else { Ask::AtLeast(0.9) };
+            case.row(by, n, &format!("speed of the last, gaps of {name}"), "m/s", speeds[4].into(), ask);
+            if by != By::Rapier {
+                assert!(speeds[4] > 0.45, "{by:?}: {speeds:?}");
+                assert!((speeds.iter().sum::<f32>() - 1.0).abs() < 1e-4, "{speeds:?}");
+                assert!(speeds.iter().map(|v| v * v).sum::<f32>() <= 1.0 + 1e-4, "energy gained: {speeds:?}");
             }
         }
-    });
-}
-
-#[test]
-fn spinning_boxes_do_not_pass_a_wall() {
-    on_both(|side, make| {
-        // (half extents, speed m/s, spin rad/s)
-        let cases = [
-            ("box 180 m/s, 30 rad/s", Vec3::splat(0.1), 180.0, Vec3::new(0.0, 30.0, 10.0)),
-            ("stick 100 m/s, 50 rad/s", Vec3::new(0.5, 0.02, 0.02), 100.0, Vec3::new(0.0, 0.0, 50.0)),
-            ("stick 100 m/s, -50 rad/s", Vec3::new(0.5, 0.02, 0.02), 100.0, Vec3::new(0.0, 0.0, -50.0)),
-            ("stick 100 m/s, 20 rad/s", Vec3::new(0.5, 0.02, 0.02), 100.0, Vec3::new(0.0, 0.0, 20.0)),
-            ("stick 100 m/s, 80 rad/s", Vec3::new(0.5, 0.02, 0.02), 100.0, Vec3::new(5.0, 0.0, 80.0)),
-        ];
-        for (name, half, speed, spin) in cases {
-            let mut scene = Scene::new();
-            scene.gravity = Vec3::ZERO;
-            scene.insert(RigidBodyBuilder::fixed(), ColliderBuilder::cuboid(0.1, 20.0, 20.0));
-            let body = RigidBodyBuilder::dynamic().translation(Vec3::new(-5.0, 0.0, 0.0));
-            let body = body.linvel(Vec3::X * speed).angvel(spin);
-            let body = scene.insert(body, ColliderBuilder::cuboid(half.x, half.y, half.z).density(1000.0)).body;
-            let mut world = make(scene, Params::default());
-            let mut farthest = f32::MIN;
-            for _ in 0..60 {
-                world.step().expect("step");
-                farthest = farthest.max(world.poses().expect("poses")[body].translation.x);
-            }
-            row(&format!("{name}, 0.2 m wall, farthest x, m"), side, farthest.into(), -0.1, "stays before");
-            let end = world.poses().expect("poses")[body].translation.x;
-            assert!(farthest <= -0.1 && end < -0.1, "{name} on {side}: the middle came to {farthest}, ends at {end}");
-        }
-    });
-}
-
-/// A stack of six boxes of 1 m, 1, 5 and 20 km from the origin. Half a unit in the last place of its coordinates is
-/// 0.03, 0.24 and 1 mm there; what the solver does in between is relative to the bodies.
-#[test]
-fn stacks_far_from_the_origin() {
-    on_both(|side, make| {
-        for kilometres in [1.0f32, 5.0, 20.0] {
-            let away = Vec3::new(1000.0 * kilometres, 0.0, 0.0);
-            let mut scene = Scene::new();
-            scene.insert(RigidBodyBuilder::fixed(), ColliderBuilder::halfspace(Vec3::Y).friction(0.6));
-            let bodies: Vec<_> = (0..6)
-                .map(|i| {
-                    let body = RigidBodyBuilder::dynamic().translation(away + Vec3::Y * (0.5 + i as f32));
-                    scene.insert(body, ColliderBuilder::cuboid(0.5, 0.5, 0.5).friction(0.6)).body
-                })
-                .collect();
-            let mut world = make(scene.clone(), Params::default());
-            run(&mut world, 300);
-            let poses = world.poses().expect("poses");
-            let aside = bodies.iter().map(|b| (poses[*b].translation - away).with_y(0.0).length()).fold(0.0, f32::max);
-            let deepest = measures::penetration(&scene, &poses).max_m * 1e3;
-            row(&format!("6-stack at {kilometres} km, deepest, mm"), side, deepest, 2.77, "said");
-            row(&format!("6-stack at {kilometres} km, sideways, m"), side, aside.into(), 0.0, "0.05 up to 5 km");
-            assert!(kilometres > 5.0 || aside < 0.05, "the stack at {kilometres} km drifted by {aside} m");
-        }
-    });
+    }
 }

@@ -3,6 +3,7 @@
 
 pub mod cases;
 pub mod engines;
+pub mod hard_cases;
 pub mod machine;
 pub mod record;
 pub mod report;

@@ -179,8 +179,16 @@ pub(crate) struct Law {
 const MEMORY_SHARE: f32 = 0.05;
 /// Memory never follows faster than this share of the difference in a sub-step.
 const MEMORY_LIMIT: f32 = 0.02;
+/// In sub-steps shorter than this, s, memory follows more slowly, by the root of their share of it: what sways near buckling
+/// is driven by memory that is quick beside its damper (docs/solver.md).
+const MEMORY_SUBSTEP: f32 = 1.0 / 480.0;
 /// Share of the gap at which a contact that bears what it remembers stops being one.
 const MEMORY_BAND: f32 = 0.9;
+
+/// Factor on the rates of memory in sub-steps of `h` seconds.
+pub(crate) fn memory_pace(h: f32) -> f32 {
+    (h / MEMORY_SUBSTEP).min(1.0).sqrt()
+}
 
 impl Solver {
     /// Refuses numbers that no step can run with.
@@ -238,8 +246,8 @@ impl Solver {
                 Law {
                     spring,
                     fixed: spring,
-                    memory_gain: on * MEMORY_SHARE / leak,
-                    memory_limit: on * MEMORY_LIMIT,
+                    memory_gain: on * memory_pace(h) * MEMORY_SHARE / leak,
+                    memory_limit: on * memory_pace(h) * MEMORY_LIMIT,
                     memory_band: on * MEMORY_BAND * h / stiffness,
                     ..Law::default()
                 }

@@ -21,6 +21,7 @@ pub use fit::{Fit, power_law};
 pub use front::{Advantage, LEAD, Setting, advantage, levels, most_accurate, quickest};
 pub use plot::{Drawn, Palette, Plot, PlotCurve, PlotPoint, plot};
 pub use scaling::{ScalingCurve, ScalingPoint, Stages, scaling, stages};
+pub(crate) use text::number;
 
 use crate::record::Record;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
 use super::StepParams;
+use crate::solver::memory_pace;
 
 /// Levels of sub-steps that islands may have; each has twice the sub-steps of the one below.
 pub const LEVELS: u32 = 4;
@@ -11,16 +12,19 @@ pub const MOST_CREDIT: u32 = LEVELS * LEVEL_HOLD - 1;
 pub const LEVEL_CALM: u32 = 8;
 
 impl StepParams {
-    /// What the passes of this level of sub-steps are told. All that follows from the length of a sub-step scales with a
-    /// power of two, which rounds nothing.
+    /// What the passes of this level of sub-steps are told. Lengths and stiffness scale with a power of two, which rounds
+    /// nothing.
     pub fn at_level(&self, level: u32) -> Self {
         let (more, less) = ((1 << level) as f32, 1.0 / (1 << level) as f32);
+        let pace = memory_pace(self.h_of(level)) / memory_pace(self.h);
         Self {
             h: self.h_of(level),
             inverse_h: self.inverse_h * more,
             substeps: self.substeps << level,
             bias_rate: self.bias_rate * more,
             static_bias_rate: self.static_bias_rate * more,
+            memory_gain: self.memory_gain * pace,
+            memory_limit: self.memory_limit * pace,
             memory_band: self.memory_band * less,
             level,
             ..*self

@@ -15,7 +15,9 @@ mod structures;
 pub use crowds::{Crowd, crowd};
 pub use heaps::{balls, balls_seeded, mixed, mixed_seeded, pile, pile_seeded};
 pub use materials::{ball_column, ball_on_slope, conveyor, rolling_ball, spinning};
-pub use motion::{bouncing_ball, bullet, closed_system, cradle, free_box, free_fall, ramp, sliding_box, slip_to_roll};
+pub use motion::{
+    bouncing_ball, bullet, closed_system, cradle, free_box, free_fall, pulled_box, ramp, sliding_box, slip_to_roll,
+};
 pub use stacks::{
     column, hub, large_on_small, many_pyramids, mass_ratio, overlap_cube, pyramid, topped_pyramid, wide_pyramid,
 };
