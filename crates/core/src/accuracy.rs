@@ -44,7 +44,9 @@ impl fmt::Display for Accuracy {
             Self::Substeps(1) => write!(f, "1 sub-step"),
             Self::Substeps(n) => write!(f, "{n} sub-steps"),
             Self::Tolerance { penetration, most } => {
-                write!(f, "{} mm, {most} sub-steps at most", 1e3 * penetration)
+                // To a thousandth of a millimetre, the least there may be: 0.1 is no f32.
+                let mm = (1e6 * f64::from(*penetration)).round() / 1e3;
+                write!(f, "{mm} mm, {most} sub-steps at most")
             }
         }
     }

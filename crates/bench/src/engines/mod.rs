@@ -47,7 +47,7 @@ pub struct Method {
 impl fmt::Display for Method {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.tolerance {
-            Some(tolerance) => write!(f, "{} within {} mm", self.solver, 1e3 * tolerance),
+            Some(tolerance) => write!(f, "{} within {} mm", self.solver, (1e6 * f64::from(tolerance)).round() / 1e3),
             None => self.solver.fmt(f),
         }
     }

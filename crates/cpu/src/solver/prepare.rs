@@ -60,7 +60,7 @@ pub struct Contact<'a> {
     pub memory: &'a ManifoldMemory,
     /// What the impulses are scaled by, see [`scale`].
     pub scale: f32,
-    /// Whether it works on parts of its bodies, see [`split`](super::split).
+    /// Whether it works on parts of its bodies, see `split`.
     pub split: bool,
 }
 
