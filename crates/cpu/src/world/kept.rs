@@ -236,9 +236,11 @@ impl Kept {
             split::count_parts(&mut bodies, ends);
         }
         let mut run = run;
-        for step in step.by_level() {
+        for (index, step) in step.by_level().enumerate() {
+            if index > 0 {
+                run = watch.next(run, "prepare");
+            }
             let own = self.of_level(&batches, &matched, &bodies, &step);
-            run = watch.next(run, "prepare");
             self.rows.build(&own.start, &self.colliders, &bodies, &states, &step, |c| {
                 let index = own.order[c] as usize;
                 let pair = &matched.pairs[index];
