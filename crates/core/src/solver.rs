@@ -83,7 +83,7 @@ impl Default for Soft {
 /// Temporal Coherence", GDC 2005; "Fast and Simple Physics using Sequential Impulses", GDC 2006). Overlap is undone by
 /// a velocity that the contacts are given beside (Baumgarte, 1972), which stays in the bodies as energy.
 ///
-/// Iterations and share are Bullet's, which runs them once a step: that is `Params::substeps` 1. Bad, then, at tall
+/// Iterations and share are Bullet's, which runs them once a step: that is `Accuracy::Substeps(1)`. Bad, then, at tall
 /// stacks and large ratios of mass, where the iterations end long before the load has passed all contacts: a column of
 /// 20 falls. With sub-steps it is accurate, at many times the cost of the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
