@@ -59,13 +59,11 @@ fn ask(
     }
 }
 
-// Whether pair i is a constraint.
-fn touches(i: u32) -> bool {
-    return i < atomicLoad(&counters[CONTROL_PAIR_COUNT]) && i < step.pair_capacity && manifolds[i].count > 0u;
-}
-
-// A body of pair i that moves; of two, the first; NO_ISLAND without.
+// A body of pair i that moves; of two, the first; NO_ISLAND without, or where the pair is no constraint.
 fn moving_body(i: u32) -> u32 {
+    if i >= atomicLoad(&counters[CONTROL_PAIR_COUNT]) || i >= step.pair_capacity || manifolds[i].count == 0u {
+        return NO_ISLAND;
+    }
     let body_a = aabbs[next_pairs[i].a].body;
     let body_b = aabbs[next_pairs[i].b].body;
     if (body_a & AABB_DYNAMIC) != 0u {
@@ -90,12 +88,10 @@ fn measure(
     @builtin(local_invocation_index) lid: u32,
 ) {
     let i = invocation(wg, num, lid);
-    if touches(i) {
-        let body = moving_body(i);
-        if body != NO_ISLAND {
-            // As integers, floats that are not negative keep their order.
-            atomicMax(&island_overlaps[islands[body]], bitcast<u32>(overlap(i)));
-        }
+    let body = moving_body(i);
+    if body != NO_ISLAND {
+        // As integers, floats that are not negative keep their order.
+        atomicMax(&island_overlaps[islands[body]], bitcast<u32>(overlap(i)));
     }
 }
 
@@ -146,11 +142,9 @@ fn spend(
     @builtin(local_invocation_index) lid: u32,
 ) {
     let i = invocation(wg, num, lid);
-    if touches(i) {
-        let body = moving_body(i);
-        if body != NO_ISLAND {
-            atomicAdd(&visits, step.substeps << level_of(step.levels, work_states[body].credit));
-        }
+    let body = moving_body(i);
+    if body != NO_ISLAND {
+        atomicAdd(&visits, step.substeps << level_of(step.levels, work_states[body].credit));
     }
     workgroupBarrier();
     if lid == 0u {

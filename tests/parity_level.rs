@@ -51,8 +51,6 @@ fn check(what: &str, scene: &Scene, levels: u32, alone: &mut Alone) {
     });
 
     level::decide(&mut states, &labels, &manifolds, &frame.ends, &step, &mut control);
-    // That many are counted by the stage before.
-    control.islands = 0;
     let gpu: Vec<BodyState> = alone.take("work_states");
     assert!(gpu.iter().map(|s| s.credit).eq(states.iter().map(|s| s.credit)), "{what}: credits");
     assert!(gpu == states, "{what}: nothing but credits changes");

@@ -76,3 +76,15 @@ struct PoseRecord {
 fn moves(flags: u32) -> bool {
     return (flags & (BODY_KIND | BODY_FROZEN | BODY_ASLEEP)) == BODY_DYNAMIC;
 }
+
+// Mass splitting: a part of a body, before any constraint of the last batch worked on it.
+fn last_part(body: SolverBody) -> SolverBody {
+    var part = body;
+    let parts = f32(max(body.parts, 1u));
+    part.inverse_mass *= parts;
+    part.inverse_inertia_diagonal *= parts;
+    part.inverse_inertia_off *= parts;
+    part.weight = 0.0;
+    part.weighted = 0.0;
+    return part;
+}

@@ -112,16 +112,6 @@ fn response(
     return (a.inverse_mass + b.inverse_mass) * dot(u, v) + dot(v, turn_a + turn_b);
 }
 
-// What a constraint that is solved by mass splitting has of a body.
-fn part_of(body: SolverBody) -> SolverBody {
-    var part = body;
-    let parts = f32(max(body.parts, 1u));
-    part.inverse_mass *= parts;
-    part.inverse_inertia_diagonal *= parts;
-    part.inverse_inertia_off *= parts;
-    return part;
-}
-
 fn point_velocity(body: SolverBody, r: vec3<f32>) -> vec3<f32> {
     return body.linear_velocity + cross(body.angular_velocity, r);
 }
@@ -189,8 +179,8 @@ fn constraints(
     var a = solver_bodies[body_a];
     var b = solver_bodies[body_b];
     if (step.batching & BATCHING_SPLIT_LAST) != 0u && c >= control.batch_start[LAST_BATCH / 4u][LAST_BATCH % 4u] {
-        a = part_of(a);
-        b = part_of(b);
+        a = last_part(a);
+        b = last_part(b);
     }
     let normal = manifolds[index].normal;
     let count = manifolds[index].count;

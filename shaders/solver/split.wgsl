@@ -30,18 +30,6 @@ struct Change {
 @group(0) @binding(8) var<storage, read> part_ends: array<u32>;
 @group(0) @binding(9) var<storage, read_write> part_changes: array<Change>;
 
-// A part of a body, before any constraint worked on it.
-fn last_part(slot: u32) -> SolverBody {
-    var part = solver_bodies[slot];
-    let parts = f32(max(part.parts, 1u));
-    part.inverse_mass *= parts;
-    part.inverse_inertia_diagonal *= parts;
-    part.inverse_inertia_off *= parts;
-    part.weight = 0.0;
-    part.weighted = 0.0;
-    return part;
-}
-
 fn change_of(before: ptr<function, SolverBody>, after: ptr<function, SolverBody>) -> Change {
     return Change(
         (*after).linear_velocity - (*before).linear_velocity,
@@ -67,8 +55,8 @@ fn add(sum: ptr<function, Change>, more: Change) {
 // A visit to constraint c, number j of the last batch.
 fn visit_parts(kind: u32, c: u32, j: u32) {
     let head = heads[c];
-    var before_a = last_part(head.body_a);
-    var before_b = last_part(head.body_b);
+    var before_a = last_part(solver_bodies[head.body_a]);
+    var before_b = last_part(solver_bodies[head.body_b]);
     var a = before_a;
     var b = before_b;
     if kind == LOAD {

@@ -5,7 +5,7 @@
 //! one below. Bodies keep what their islands want, so that islands may meet and part: the most wanted counts.
 
 use crate::batch::{Ends, NO_BODY};
-use crate::island::{self, NO_ISLAND};
+use crate::island::NO_ISLAND;
 use tumble_core::layout::{BodyState, Control, LEVEL_CALM, LEVEL_HOLD, MOST_CREDIT, Manifold, StepParams};
 
 /// What stands for the overlap of contacts that have none, m; 0 is that of an island without contacts.
@@ -30,6 +30,12 @@ pub fn overlap(manifold: &Manifold) -> f32 {
     points.iter().fold(NO_OVERLAP, |deepest, point| deepest.max(-point.separation))
 }
 
+/// A body of a constraint that moves; of two, the first.
+fn moving_body(manifold: &Manifold, ends: Ends) -> Option<usize> {
+    let body = if ends.a != NO_BODY { ends.a } else { ends.b };
+    (manifold.count > 0 && body != NO_BODY).then_some(body as usize)
+}
+
 /// Decides for each island. Credits are in `states` before and after; `labels`, `manifolds` and `ends` are those of the
 /// step.
 pub fn decide(
@@ -47,9 +53,8 @@ pub fn decide(
     }
     let mut deepest = 0.0f32;
     for (manifold, ends) in manifolds.iter().zip(ends) {
-        let body = if ends.a != NO_BODY { ends.a } else { ends.b };
-        if body != NO_BODY && manifold.count > 0 {
-            let deep = &mut overlaps[labels[body as usize] as usize];
+        if let Some(body) = moving_body(manifold, *ends) {
+            let deep = &mut overlaps[labels[body] as usize];
             *deep = overlap(manifold).max(*deep);
             deepest = deepest.max(*deep);
         }
@@ -61,13 +66,8 @@ pub fn decide(
         control.levels_used |= 1 << step.level_of(state.credit);
         control.bodies_over += u32::from(overlap > step.tolerance);
     }
-    for ends in ends.iter().zip(manifolds).filter_map(|(ends, manifold)| (manifold.count > 0).then_some(ends)) {
-        let body = if ends.a != NO_BODY { ends.a } else { ends.b };
-        if body != NO_BODY {
-            let substeps = step.substeps << step.level_of(states[body as usize].credit);
-            control.visits = control.visits.wrapping_add(substeps);
-        }
+    for body in manifolds.iter().zip(ends).filter_map(|(manifold, ends)| moving_body(manifold, *ends)) {
+        control.visits = control.visits.wrapping_add(step.substeps << step.level_of(states[body].credit));
     }
-    control.islands = island::count(labels);
     control.residual = deepest.to_bits();
 }

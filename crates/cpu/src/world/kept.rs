@@ -6,7 +6,7 @@ use crate::broadphase::{self, Boxes, Finder, Search, TooMany};
 use crate::contact::{self, Matched};
 use crate::shared::Shared;
 use crate::solver::{self, Rows, prepare, split, store};
-use crate::{bounds, continuous, edit, level, motion, narrowphase, sleep};
+use crate::{bounds, continuous, edit, island, level, motion, narrowphase, sleep};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -222,6 +222,7 @@ impl Kept {
         let run = watch.begin("prepare");
         let Planned { mut states, matched, manifolds, batches, mut control, ends, waking } = planned;
         let labels = self.labels(&states, &manifolds, &ends, step);
+        control.islands = island::count(&labels);
         if step.tolerance >= 0.0 {
             level::decide(&mut states, &labels, &manifolds, &ends, step, &mut control);
         }
