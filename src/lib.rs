@@ -43,10 +43,10 @@ pub use world::{Backend, World};
 /// What most programs need.
 pub mod prelude {
     pub use crate::{
-        Backend, Batching, BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Contact,
-        ContactPoint, Contacts, Error, Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Params, Pose, Poses,
-        Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, Sleep, StepReport, Velocities, Velocity,
-        World,
+        Accuracy, Backend, Batching, BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule,
+        Contact, ContactPoint, Contacts, Error, Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Params, Pose,
+        Poses, Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, Sleep, StepReport, Velocities,
+        Velocity, World,
     };
     pub use glam::{Quat, Vec3};
 }

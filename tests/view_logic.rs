@@ -9,7 +9,6 @@ mod grab;
 
 use clock::{Clock, MOST_STEPS};
 use grab::Grab;
-use tumble::Accuracy;
 use tumble::prelude::*;
 
 const DT: f64 = 1.0 / 60.0;

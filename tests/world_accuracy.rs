@@ -118,6 +118,15 @@ fn both_sides_spend_alike() {
     assert_eq!(hash(&mut worlds[0]), hash(&mut alone));
 }
 
+/// Oracle: what was told; a tenth of a millimetre is no f32.
+#[test]
+fn tolerances_are_shown_as_told() {
+    let shown = |penetration| params(penetration, 16).accuracy.to_string();
+    assert_eq!(shown(1e-4), "0.1 mm, 16 sub-steps at most");
+    assert_eq!(shown(1e-6), "0.001 mm, 16 sub-steps at most");
+    assert_eq!([1, 8].map(|n| Accuracy::Substeps(n).to_string()), ["1 sub-step", "8 sub-steps"]);
+}
+
 /// From a tolerance to a number of sub-steps and back, in mid-run. Oracle: the scene stays as it is (at rest), the report
 /// follows.
 #[test]
