@@ -21,6 +21,14 @@ pub mod body_flags {
     pub const STAYS_AWAKE: u32 = 16;
 }
 
+/// Bits of [`SolverBody::touched`].
+pub mod touched {
+    /// A contact, or a joint that is solved by Gauss-Seidel: the body moves by the velocity that these were solved for.
+    pub const CONTACT: u32 = 1;
+    /// Joints that are solved directly: gravity comes in two half kicks.
+    pub const JOINED: u32 = 2;
+}
+
 /// What lasts of a body from step to step. 96 bytes. Position is that of the centre of mass; the body frame
 /// is the principal frame of inertia. Written only when a step commits.
 #[repr(C)]
@@ -112,7 +120,7 @@ pub struct SolverBody {
     pub inverse_mass: f32,
     /// rad/s, world frame.
     pub angular_velocity: [f32; 3],
-    /// 1 when a constraint touches the body in this step.
+    /// What holds the body in this step, see [`touched`].
     pub touched: u32,
     /// Change of position since the step began, m.
     pub translation: [f32; 3],

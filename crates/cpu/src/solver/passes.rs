@@ -8,6 +8,7 @@ use super::simd::Lanes;
 use super::{
     Bodies, Pass, Rows, Visit, gauss_seidel_lanes, jacobi_lanes, one_pass_lanes, penalty_lanes, soft_lanes, takes_part,
 };
+use crate::joint::Running;
 use crate::shared::Shared;
 use crate::workers::{block_of, blocks, run_stages};
 use std::ops::Range;
@@ -17,6 +18,8 @@ use wide::f32x4;
 
 /// Fewest groups of a block.
 const GROUPS: usize = 8;
+/// Fewest islands of joints of a block.
+const ISLANDS: usize = 1;
 /// Fewest bodies of a block.
 const BODIES: usize = 128;
 
@@ -52,19 +55,31 @@ fn parts(rows: &Rows) -> Vec<Part> {
 }
 
 /// Runs the passes.
-pub(super) fn run(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, passes: &[Pass]) {
+pub(super) fn run(
+    rows: &mut Rows,
+    bodies: Bodies<'_>,
+    joints: Option<&Running<'_>>,
+    step: &StepParams,
+    passes: &[Pass],
+) {
     let parts = parts(rows);
     let Bodies { solver, states, props } = bodies;
     let all = 0..solver.len();
     let mut stages: Vec<(Pass, Option<&Part>)> = Vec::new();
     for &pass in passes {
         match pass {
-            Pass::Bodies(_) => stages.push((pass, None)),
+            Pass::Bodies(_) | Pass::Joints(_) => stages.push((pass, None)),
             Pass::Sweep(_) => stages.extend(parts.iter().map(|part| (pass, Some(part)))),
         }
     }
     let body_blocks = blocks(all.len(), BODIES);
-    let counts: Vec<u32> = stages.iter().map(|(_, part)| part.map_or(body_blocks, |part| part.blocks)).collect();
+    let all_islands = 0..joints.map_or(0, Running::islands);
+    let island_blocks = blocks(all_islands.len(), ISLANDS);
+    let count_of = |(pass, part): &(Pass, Option<&Part>)| match pass {
+        Pass::Joints(_) => island_blocks,
+        _ => part.map_or(body_blocks, |part| part.blocks),
+    };
+    let counts: Vec<u32> = stages.iter().map(count_of).collect();
     let groups = rows.groups.shared();
     let last = Mutex::new(&mut rows.last);
     let bodies = Shared::new(solver);
@@ -75,6 +90,13 @@ pub(super) fn run(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, passes
                 let body = unsafe { &mut bodies.slice_mut(i..i + 1)[0] };
                 if takes_part(body, &states[i], step) {
                     each(body, &states[i], &props[i], step);
+                }
+            }
+        }
+        (Pass::Joints(part), _) => {
+            for island in block_of(&all_islands, block, island_blocks) {
+                if let Some(joints) = joints {
+                    joints.run(part, island, &bodies, step);
                 }
             }
         }
