@@ -12,6 +12,7 @@ mod contact;
 pub mod device;
 mod edit;
 mod island;
+mod joint;
 mod level;
 mod motion;
 mod narrowphase;

@@ -13,7 +13,7 @@ use crate::sleep::Sleep;
 use crate::solver::Solver;
 use crate::store::Sizes;
 use crate::{Buffers, Gpu, Pipelines, Recorder};
-use tumble_core::edit::Stale;
+use tumble_core::edit::EditBatch;
 use tumble_core::layout::StepParams;
 use tumble_core::{Plan, Result};
 
@@ -68,8 +68,9 @@ impl Stages {
     }
 
     /// Tells stages what they must know on the host before the step is submitted.
-    pub(crate) fn prepare(&mut self, gpu: &Gpu, step: &StepParams, stale: Stale) -> Result<()> {
-        self.broadphase.prepare(gpu, step, stale)
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, step: &StepParams, edits: &EditBatch) -> Result<()> {
+        self.solver.prepare(&edits.joints);
+        self.broadphase.prepare(gpu, step, edits.stale)
     }
 
     /// Records one step: the plan phase up to the second gate, then the commit phase, whose passes do nothing once the

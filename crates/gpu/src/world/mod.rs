@@ -5,6 +5,7 @@ mod queries;
 mod results;
 
 use crate::broadphase::Choice;
+use crate::joint;
 use crate::query::Query;
 use crate::readback::{Readback, read_now};
 use crate::stages::{Built, Stages};
@@ -14,11 +15,12 @@ use bytemuck::Zeroable;
 use glam::Vec3;
 use growth::within;
 use std::collections::VecDeque;
+use std::sync::Arc;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{Control, LAST_BATCH, Pair, PoseRecord, StepParams};
 use tumble_core::limits::{self, Room};
 use tumble_core::stopwatch::{Span, Stopwatch};
-use tumble_core::{Editor, Params, Poses, Result, Scene, StageRun, StageTime, StepReport, WantedLevels};
+use tumble_core::{Editor, JointSet, Params, Poses, Result, Scene, StageRun, StageTime, StepReport, WantedLevels};
 
 /// Steps in flight before `step` waits.
 const IN_FLIGHT: usize = 3;
@@ -78,6 +80,8 @@ pub struct World {
     watch: Stopwatch,
     growths: Vec<(&'static str, u32)>,
     drop_pair: u32,
+    /// The joints that are in the buffers.
+    uploaded: Arc<JointSet>,
     /// From the first query on.
     query: Option<Query>,
 }
@@ -163,6 +167,7 @@ impl World {
             watch: Stopwatch::default(),
             growths: Vec::new(),
             drop_pair: u32::MAX,
+            uploaded: Arc::default(),
             built,
             query: None,
             cache: BindCache::new(),
@@ -344,7 +349,7 @@ impl World {
         let run = self.watch.begin("upload");
         self.upload(&record)?;
         if !record.idle {
-            self.stages.prepare(&self.gpu, &record.step, record.edits.stale)?;
+            self.stages.prepare(&self.gpu, &record.step, &record.edits)?;
         }
         let run = self.watch.next(run, "record");
         let timer = if self.params.profile { self.timer.as_mut() } else { None };
@@ -370,6 +375,11 @@ impl World {
         for step in record.step.by_level() {
             queue.write_buffer(self.buffers.buffer("level_steps")?, level_offset(&step), bytemuck::bytes_of(&step));
         }
+        if !Arc::ptr_eq(&self.uploaded, &edits.joints) {
+            joint::upload(&self.gpu, &mut self.buffers, &edits.joints)?;
+            self.uploaded = edits.joints.clone();
+        }
+        let queue = &self.gpu.queue;
         queue.write_buffer(self.buffers.buffer("edit_records")?, 0, bytemuck::cast_slice(&edits.records));
         queue.write_buffer(self.buffers.buffer("edit_ranges")?, 0, bytemuck::cast_slice(&edits.ranges));
         Ok(())
