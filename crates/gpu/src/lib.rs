@@ -12,6 +12,7 @@ mod contact;
 pub mod device;
 mod edit;
 mod island;
+mod joined;
 mod level;
 mod motion;
 mod narrowphase;

@@ -10,13 +10,14 @@ pub mod frame;
 pub mod island;
 pub mod rows;
 
+use crate::bounds::moves;
 use crate::math::{finite, vec3};
 use crate::shared::Shared;
 use bytemuck::Zeroable;
 use island::{Island, Scene, Store};
 use std::sync::Mutex;
 use tumble_core::JointSet;
-use tumble_core::layout::{BodyProps, BodyState, JointState, SolverBody, StepParams, touched};
+use tumble_core::layout::{BodyProps, BodyState, JointIsland, JointState, SolverBody, StepParams, touched};
 
 /// A part of a sub-step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,9 +70,9 @@ impl Joints {
     }
 
     /// Takes down what a level of sub-steps left of its joints.
-    pub fn store(&mut self, set: &JointSet, bodies: &[SolverBody], step: &StepParams) {
+    pub fn store(&mut self, set: &JointSet, states: &[BodyState], bodies: &[SolverBody], step: &StepParams) {
         for (info, island) in set.topology.islands.iter().zip(&mut self.islands) {
-            if bodies[set.topology.bodies[info.first_body as usize].body as usize].level != step.level {
+            if level(set, info, states, |slot| bodies[slot].level) != Some(step.level) {
                 continue;
             }
             let island = island.get_mut().expect("no thread panicked with it");
@@ -94,8 +95,8 @@ impl Running<'_> {
     /// A part of a sub-step of an island.
     pub(crate) fn run(&self, part: Part, index: usize, bodies: &Shared<'_, SolverBody>, step: &StepParams) {
         let info = &self.scene.set.topology.islands[index];
-        let first = self.scene.set.topology.bodies[info.first_body as usize].body;
-        if Store::get(bodies, first as usize).level != step.level {
+        let level = level(self.scene.set, info, self.scene.states, |slot| Store::get(bodies, slot).level);
+        if level != Some(step.level) {
             return;
         }
         let mut island = self.islands[index].lock().expect("no thread panicked with it");
@@ -113,4 +114,12 @@ pub fn mark(set: &JointSet, bodies: &mut [SolverBody]) {
         let bit = if body.direct != 0 { touched::JOINED } else { touched::CONTACT };
         bodies[body.body as usize].touched |= bit;
     }
+}
+
+/// The level of sub-steps of an island that is solved directly, by that of each body; none where all its bodies sleep or
+/// are in quarantine: nothing is solved then, and what its joints remember stays.
+fn level(set: &JointSet, info: &JointIsland, states: &[BodyState], of: impl Fn(usize) -> u32) -> Option<u32> {
+    let bodies = &set.topology.bodies[info.first_body as usize..][..info.body_count as usize];
+    let awake = bodies.iter().map(|body| body.body as usize).find(|&slot| moves(states[slot].flags));
+    awake.map(of)
 }
