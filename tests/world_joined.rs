@@ -319,16 +319,19 @@ fn two_chains() -> (Scene, Vec<BodyHandle>) {
 /// all of that chain and wakes no other.
 #[test]
 fn chains_hang_and_sleep() {
-    for side in JOINT_SIDES {
+    // Ball joints were off by 2.4e-7 m when solved directly, and by 1.4e-4 m by Gauss-Seidel.
+    let solvers = [(JointSolver::Direct, 1e-5), (JointSolver::GaussSeidel, 1e-3)];
+    for (side, (joints, most)) in JOINT_SIDES.into_iter().flat_map(|side| solvers.map(|solver| (side, solver))) {
         let (scene, links) = two_chains();
-        let mut world = side.world(&scene, &sleeping());
+        let mut world = side.world(&scene, &Params { joints, ..sleeping() });
+        let mut off = 0.0f32;
         world.edit().apply_impulse(links[4], Vec3::X * 2.0).unwrap();
         let mut count = 0;
         while report(&mut world).islands_asleep < 2 && count < 1200 {
             steps(&mut world, 20);
             count += 20;
         }
-        assert_eq!(counts(&report(&mut world)), (9, 0, 2), "{side:?}, after {count} steps");
+        assert_eq!(counts(&report(&mut world)), (9, 0, 2), "{side:?}, {joints:?}, after {count} steps");
         let before = hash(&mut world);
         steps(&mut world, 5);
         assert_eq!(hash(&mut world), before, "{side:?}");
@@ -341,10 +344,11 @@ fn chains_hang_and_sleep() {
             let moved = awake[link].translation != asleep[link].translation;
             assert_eq!(moved, i < 5, "{side:?}, link {i}");
             assert!(awake[link].translation.is_finite() && velocities[link].linear.is_finite(), "{side:?}, link {i}");
-            // 100 kg a link hang on ball joints: to a millimetre they are where chains of 1 m links can be.
             let above = if i == 0 || i == 5 { Vec3::X * [0.0, 3.0][i / 5] } else { foot(&awake[links[i - 1]]) };
-            assert!((head(&awake[link]) - above).length() < 1e-3, "{side:?}, link {i}");
+            off = off.max((head(&awake[link]) - above).length());
         }
+        println!("{side:?}, {joints:?}: {off} m");
+        assert!(off < most, "{side:?}, {joints:?}: {off} m");
     }
 }
 

@@ -26,21 +26,57 @@ pub struct Body {
     pub pose: Pose,
 }
 
+/// Largest turn of a body by a projection, rad.
+pub const MAX_PROJECTION: f32 = 0.5;
+
+impl Pose {
+    /// Moved by a way and a turn, m and rad.
+    pub fn moved(&self, way: Vec3, turn: Vec3) -> Self {
+        let angle = turn.length();
+        let half = turn * (if angle > MAX_PROJECTION { 0.5 * MAX_PROJECTION / angle } else { 0.5 });
+        let turn = Quat::from_xyzw(half.x, half.y, half.z, 1.0).normalize();
+        Self { translation: self.translation + way, rotation: (turn * self.rotation).normalize() }
+    }
+}
+
 impl Body {
     /// As the solver has it.
     pub fn of(body: &SolverBody, state: &BodyState) -> Self {
-        let [xx, yy, zz] = body.inverse_inertia_diagonal;
-        let [xy, xz, yz] = body.inverse_inertia_off;
         Self {
             linear: vec3(body.linear_velocity),
             angular: vec3(body.angular_velocity),
             inverse_mass: body.inverse_mass,
-            inverse_inertia: Mat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]),
+            inverse_inertia: inverse_inertia_of(body),
             pose: Pose {
                 translation: vec3(body.translation),
                 rotation: (quat(body.delta) * quat(state.rotation)).normalize(),
             },
         }
+    }
+
+    /// The solver's body with these velocities; what joints add to them is no load of contacts.
+    pub fn put_velocities(&self, mut body: SolverBody) -> SolverBody {
+        let (linear, angular) = (vec3(body.linear_velocity), vec3(body.angular_velocity));
+        body.linear_start = (vec3(body.linear_start) + (self.linear - linear)).to_array();
+        body.angular_start = (vec3(body.angular_start) + (self.angular - angular)).to_array();
+        body.linear_velocity = self.linear.to_array();
+        body.angular_velocity = self.angular.to_array();
+        body
+    }
+
+    /// The solver's body with this inertia. What contacts will add again to its angular velocity is what their torques do
+    /// to the new inertia: that of a light body may have changed a hundredfold.
+    pub fn put_inertia(&self, mut body: SolverBody) -> SolverBody {
+        let before = inverse_inertia_of(&body);
+        let carried = vec3(body.angular_velocity) - vec3(body.angular_start);
+        if before.determinant() > 0.0 && carried != Vec3::ZERO {
+            let carried = self.inverse_inertia * (before.inverse() * carried);
+            body.angular_start = (vec3(body.angular_velocity) - carried).to_array();
+        }
+        let i = self.inverse_inertia;
+        body.inverse_inertia_diagonal = [i.x_axis.x, i.y_axis.y, i.z_axis.z];
+        body.inverse_inertia_off = [i.x_axis.y, i.x_axis.z, i.y_axis.z];
+        body
     }
 
     /// Where it is after h, as far as its velocities tell.
@@ -53,6 +89,12 @@ impl Body {
         let turn = if square < 1.0 { Quat::from_xyzw(half.x, half.y, half.z, 1.0).normalize() } else { turn };
         Pose { translation: self.pose.translation + h * self.linear, rotation: (turn * self.pose.rotation).normalize() }
     }
+}
+
+fn inverse_inertia_of(body: &SolverBody) -> Mat3 {
+    let [xx, yy, zz] = body.inverse_inertia_diagonal;
+    let [xy, xz, yz] = body.inverse_inertia_off;
+    Mat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz])
 }
 
 /// Up to three rows.
@@ -70,6 +112,8 @@ pub struct Block {
     pub response_b: Mat3,
     /// Impulses of this sub-step, N s or N m s.
     pub impulse: Vec3,
+    /// What they give now.
+    pub push: Vec3,
     /// Change of the rows' own velocities by a unit impulse, where all rows would be active.
     pub own: Vec3,
     /// Pieces of the three rows.
@@ -85,8 +129,10 @@ impl Default for Piece {
 /// A joint in a step.
 #[derive(Debug, Clone, Copy)]
 pub struct Work {
-    /// What it is.
-    pub joint: Joint,
+    /// Its slot.
+    pub slot: u32,
+    /// Its axes, see [`joint_bits`]; none once it is broken.
+    pub axes: u32,
     /// What lasts of it.
     pub state: JointState,
     /// From the first centre of mass to the second one when the step began, m.
@@ -102,15 +148,6 @@ impl Block {
     pub fn velocity(&self, a: &Body, b: &Body) -> Vec3 {
         self.along.transpose() * (b.linear - a.linear)
             + (self.turn_b.transpose() * b.angular - self.turn_a.transpose() * a.angular)
-    }
-
-    /// Gives the bodies an impulse of the rows.
-    pub fn push(&self, impulse: Vec3, a: &mut Body, b: &mut Body) {
-        let along = self.along * impulse;
-        a.linear -= a.inverse_mass * along;
-        a.angular -= self.response_a * impulse;
-        b.linear += b.inverse_mass * along;
-        b.angular += self.response_b * impulse;
     }
 
     /// The block on the diagonal of the system; rows that are not active have a one.
@@ -129,20 +166,17 @@ impl Block {
 
 impl Work {
     /// A joint at the beginning of a step with sub-steps of length `h`.
-    pub fn new(joint: Joint, state: JointState, between: Vec3, h: f32) -> Self {
+    pub fn new(slot: u32, joint: &Joint, state: JointState, between: Vec3, h: f32) -> Self {
         let fresh = JointState { tag: joint.generation + 1, h, ..JointState::zeroed() };
         let mut state = if state.tag == fresh.tag { state } else { fresh };
         let scale = if state.h == h || state.h == 0.0 { 1.0 } else { h / state.h };
         state.impulse = state.impulse.map(|x| scale * x);
         state.torque = state.torque.map(|x| scale * x);
         state.h = h;
-        let mut joint = joint;
-        if state.broken != 0 {
-            joint.axes = 0;
-        }
+        let axes = if state.broken != 0 { 0 } else { joint.axes };
         let still = Pose { translation: Vec3::ZERO, rotation: Quat::IDENTITY };
         let blocks = [Block::default(); 2];
-        Self { joint, state, between, frame: frame(&joint, &still, &still, between), blocks }
+        Self { slot, axes, state, between, frame: frame(joint, &still, &still, between), blocks }
     }
 
     /// The impulses of the last sub-step, in the axes as they are now.
@@ -157,14 +191,14 @@ impl Work {
     }
 
     /// Takes the coordinates from the poses; axes and rows stay those of the factor.
-    pub fn look(&mut self, a: &Body, b: &Body) {
-        let now = frame(&self.joint, &a.pose, &b.pose, self.between);
+    pub fn look(&mut self, joint: &Joint, a: &Body, b: &Body) {
+        let now = frame(joint, &a.pose, &b.pose, self.between);
         (self.frame.shift, self.frame.turn) = (now.shift, now.turn);
     }
 
     /// Takes axes, coordinates and rows from the poses; pieces stay as they were.
-    pub fn refresh(&mut self, a: &Body, b: &Body) {
-        self.frame = frame(&self.joint, &a.pose, &b.pose, self.between);
+    pub fn refresh(&mut self, joint: &Joint, a: &Body, b: &Body) {
+        self.frame = frame(joint, &a.pose, &b.pose, self.between);
         self.rebuild(a, b);
     }
 
@@ -173,8 +207,7 @@ impl Work {
         let Frame { arm_a, arm_b, along, about, .. } = self.frame;
         let masses = a.inverse_mass + b.inverse_mass;
         for (which, block) in self.blocks.iter_mut().enumerate() {
-            let rows =
-                self.joint.axes >> (3 * which) & 7 | self.joint.axes >> (joint_bits::DRIVEN + 3 * which as u32) & 7;
+            let rows = self.axes >> (3 * which) & 7 | self.axes >> (joint_bits::DRIVEN + 3 * which as u32) & 7;
             for row in 0..3 {
                 let axis = if rows >> row & 1 == 0 {
                     Vec3::ZERO
@@ -199,14 +232,14 @@ impl Work {
     }
 
     /// Chooses the pieces of all rows for the velocities and impulses as they are. Whether the system is another one by it.
-    pub fn choose(&mut self, a: &Body, b: &Body, h: f32) -> bool {
+    pub fn choose(&mut self, joint: &Joint, a: &Body, b: &Body, h: f32) -> bool {
         let mut changed = false;
         for axis in 0..6 {
-            if (self.joint.axes | self.joint.axes >> joint_bits::DRIVEN) >> axis & 1 == 0 {
+            if (self.axes | self.axes >> joint_bits::DRIVEN) >> axis & 1 == 0 {
                 continue;
             }
             let (which, row) = (axis / 3, axis % 3);
-            let mut new = piece(&self.joint, axis, &self.at(which, row, a, b), h);
+            let mut new = piece(joint, axis, &self.at(which, row, a, b), h);
             let piece = &mut self.blocks[which].pieces[row];
             if piece.kind == new.kind && (piece.gamma - new.gamma).abs() <= SAME_SPRING * piece.gamma {
                 // Its goal goes with either.
@@ -218,27 +251,42 @@ impl Work {
         changed
     }
 
-    /// Gives the bodies what rows of a fixed impulse are to have given.
-    pub fn push_fixed(&mut self, a: &mut Body, b: &mut Body) {
-        let Frame { arm_a, arm_b, along, about, .. } = self.frame;
-        for axis in 0..6 {
-            let (which, row) = (axis / 3, axis % 3);
-            let block = &mut self.blocks[which];
-            let more = block.pieces[row].goal - block.impulse[row];
-            if block.pieces[row].kind != kind::FIXED || more == 0.0 {
-                continue;
-            }
-            block.impulse[row] = block.pieces[row].goal;
-            let (push, turn_a, turn_b) = if which == 0 {
-                let axis = more * along.col(row);
-                (axis, arm_a.cross(axis), arm_b.cross(axis))
+    /// Gives a body what the rows give now.
+    pub fn push(&self, second: bool, body: &mut Body) {
+        for block in &self.blocks {
+            let along = block.along * block.push;
+            if second {
+                body.linear += body.inverse_mass * along;
+                body.angular += block.response_b * block.push;
             } else {
-                (Vec3::ZERO, more * about.col(row), more * about.col(row))
-            };
-            a.linear -= a.inverse_mass * push;
-            a.angular -= a.inverse_inertia * turn_a;
-            b.linear += b.inverse_mass * push;
-            b.angular += b.inverse_inertia * turn_b;
+                body.linear -= body.inverse_mass * along;
+                body.angular -= block.response_a * block.push;
+            }
+        }
+    }
+
+    /// What rows of a fixed impulse are still to give; others give nothing.
+    pub fn fix(&mut self) {
+        for block in &mut self.blocks {
+            for row in 0..3 {
+                let fixed = block.pieces[row].kind == kind::FIXED;
+                block.push[row] = if fixed { block.pieces[row].goal - block.impulse[row] } else { 0.0 };
+                block.impulse[row] += block.push[row];
+            }
+        }
+    }
+
+    /// Gives a body what rows of a fixed impulse give now: they are in no block of the system.
+    pub fn push_fixed(&self, second: bool, body: &mut Body) {
+        let push = self.frame.along * self.blocks[0].push;
+        let arm = if second { self.frame.arm_b } else { self.frame.arm_a };
+        let turn = body.inverse_inertia * (arm.cross(push) + self.frame.about * self.blocks[1].push);
+        if second {
+            body.linear += body.inverse_mass * push;
+            body.angular += turn;
+        } else {
+            body.linear -= body.inverse_mass * push;
+            body.angular -= turn;
         }
     }
 
@@ -274,8 +322,8 @@ impl Work {
 
     /// By how much the separation of the locked rows will be off what is linear, as far as it is to be believed: spins
     /// make it wrong, unless it is as it was in the last sub-step.
-    pub fn remainders(&mut self, a: &Body, b: &Body, h: f32) -> [Vec3; 2] {
-        let next = frame(&self.joint, &a.predicted(h), &b.predicted(h), self.between);
+    pub fn remainders(&mut self, joint: &Joint, a: &Body, b: &Body, h: f32) -> [Vec3; 2] {
+        let next = frame(joint, &a.predicted(h), &b.predicted(h), self.between);
         let now = self.frame;
         let spin = h * a.angular.length().max(b.angular.length()) / THETA;
         let still = 1.0 / (1.0 + spin * spin * spin * spin);
@@ -301,12 +349,12 @@ impl Work {
     }
 
     /// What a projection of the poses is to take out, m and rad.
-    pub fn off(&self, which: usize) -> Vec3 {
+    pub fn off(&self, joint: &Joint, which: usize) -> Vec3 {
         let mut off = Vec3::ZERO;
         for row in 0..3 {
             let axis = 3 * which + row;
             let coordinate = if which == 0 { self.frame.shift[row] } else { self.frame.turn[row] };
-            let drive = &self.joint.drives[axis];
+            let drive = &joint.drives[axis];
             off[row] = match self.blocks[which].pieces[row].kind {
                 // Of an axis that is locked by equal limits, those; else zero.
                 kind::LOCKED | kind::LOW => coordinate - drive.low,
@@ -318,17 +366,17 @@ impl Work {
     }
 
     /// What lasts of the joint after a step: it breaks where its last sub-step asked for too much.
-    pub fn lasting(&self, step: &StepParams) -> JointState {
+    pub fn lasting(&self, joint: &Joint, step: &StepParams) -> JointState {
         let force = vec3(self.state.impulse).length() * step.inverse_h;
         let torque = vec3(self.state.torque).length() * step.inverse_h;
-        let breaks = force > self.joint.break_force || torque > self.joint.break_torque;
+        let breaks = force > joint.break_force || torque > joint.break_torque;
         let (mut separation, mut angle) = (Vec3::ZERO, Vec3::ZERO);
         for row in 0..3 {
             if self.blocks[0].pieces[row].kind == kind::LOCKED {
-                separation[row] = self.frame.shift[row] - self.joint.drives[row].low;
+                separation[row] = self.frame.shift[row] - joint.drives[row].low;
             }
             if self.blocks[1].pieces[row].kind == kind::LOCKED {
-                angle[row] = self.frame.turn[row] - self.joint.drives[3 + row].low;
+                angle[row] = self.frame.turn[row] - joint.drives[3 + row].low;
             }
         }
         JointState {
