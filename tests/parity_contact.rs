@@ -93,7 +93,8 @@ impl Kept {
         }
         // An eighth of the pairs, as many others, in steps with joints.
         let eighth = keys.iter().step_by(8).chain(&[[0, COLLIDERS - 1]]).flat_map(|&[a, b]| [[a, b], [a, a + 1]]);
-        self.apart = if number % 3 == 0 { Vec::new() } else { BTreeSet::from_iter(eighth).into_iter().collect() };
+        self.apart =
+            if number.is_multiple_of(3) { Vec::new() } else { BTreeSet::from_iter(eighth).into_iter().collect() };
         let manifold = |_: &[u32; 2]| Manifold {
             normal: random.vector(1.0).to_array(),
             count: random.below(5),
