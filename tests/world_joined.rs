@@ -215,7 +215,8 @@ fn what_is_joined_sleeps_and_wakes_as_one() {
         let mut world = side.world(&scene, &sleeping());
         world.step().unwrap();
         assert_eq!(counts(&report(&mut world)), (0, 1, 0), "{side:?}");
-        let causes: [(&str, &dyn Fn(&mut World)); 5] = [
+        type Cause<'a> = &'a dyn Fn(&mut World);
+        let causes: [(&str, Cause); 5] = [
             ("impulse on the first", &|world| world.edit().apply_impulse(bodies[0], Vec3::Y).unwrap()),
             ("impulse on the second", &|world| world.edit().apply_impulse(bodies[1], Vec3::Y).unwrap()),
             ("limits", &|world| world.edit().set_joint(joint, JointBuilder::rope(90.0)).unwrap()),
