@@ -19,12 +19,14 @@ const LEAK: f32 = 0.1026;
 
 @group(0) @binding(11) var<uniform> batch: vec4<u32>;
 
+// The level of sub-steps of a joint; none where nothing moves.
 fn level_of_joint(place: u32) -> u32 {
     let a = joint_works[place].body_a;
+    let b = joint_works[place].body_b;
     if solver_bodies[a].inverse_mass > 0.0 {
         return solver_bodies[a].level;
     }
-    return solver_bodies[joint_works[place].body_b].level;
+    return select(LEVELS, solver_bodies[b].level, solver_bodies[b].inverse_mass > 0.0);
 }
 
 // The rows of a joint whose axes and impulses are those of now.

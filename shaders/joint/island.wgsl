@@ -79,8 +79,14 @@ fn open_island(index: u32, lid: u32) -> u32 {
         shared_runs = 0u;
         if index < joint_layout.island_count && control.stop == 0u {
             shared_island = joint_island(index);
-            let body = joint_body(shared_island.first_body).body;
-            shared_runs = u32(solver_bodies[body].level == step.level);
+            // That of its first body that moves; one that nothing moves is left alone.
+            for (var k = 0u; k < shared_island.body_count; k++) {
+                let body = joint_body(shared_island.first_body + k).body;
+                if moves(work_states[body].flags) {
+                    shared_runs = u32(solver_bodies[body].level == step.level);
+                    break;
+                }
+            }
         }
     }
     return workgroupUniformLoad(&shared_runs);
@@ -373,7 +379,10 @@ fn relax(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
 fn store(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec3<u32>, @builtin(local_invocation_index) lid: u32) {
     let place = invocation(wg, num, lid);
     if place < joint_layout.joint_count && control.stop == 0u {
-        store_joint(place);
+        let slot = joint_tables[joint_layout.joints + place];
+        if moves(work_states[joints[slot].body_a].flags) || moves(work_states[joints[slot].body_b].flags) {
+            store_joint(place);
+        }
     }
 }
 

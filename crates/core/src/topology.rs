@@ -51,6 +51,8 @@ pub struct Topology {
     pub batches: Vec<u32>,
     /// Pairs of bodies that do not collide, lower slot first, ascending.
     pub apart: Vec<[u32; 2]>,
+    /// Pairs of bodies with a joint between them, broken or not, lower slot first, ascending.
+    pub joined: Vec<[u32; 2]>,
     /// Islands of joints, direct or not.
     pub island_count: u32,
     /// Islands that were to be solved directly, and are too large.
@@ -78,7 +80,8 @@ impl Topology {
         }
         topology.too_large = if solver == JointSolver::GaussSeidel { 0 } else { large.len() as u32 };
         topology.push_batches(joints, &large, moves);
-        topology.apart = apart(joints, &alive);
+        topology.apart = pairs(joints, &alive, joint_bits::APART);
+        topology.joined = pairs(joints, &alive, joint_bits::ALIVE);
         topology
     }
 
@@ -376,12 +379,12 @@ fn mark_cycles(joints: &mut [Joint], island: &[u32], moves: &impl Fn(u32) -> boo
     }
 }
 
-/// Pairs of bodies that are kept from colliding.
-fn apart(joints: &[Joint], alive: &[u32]) -> Vec<[u32; 2]> {
+/// Pairs of bodies with a joint of this flag between them.
+fn pairs(joints: &[Joint], alive: &[u32], flag: u32) -> Vec<[u32; 2]> {
     let of = |&j: &u32| {
         let joint = &joints[j as usize];
         let pair = [joint.body_a.min(joint.body_b), joint.body_a.max(joint.body_b)];
-        (joint.flags & joint_bits::APART != 0).then_some(pair)
+        (joint.flags & flag != 0).then_some(pair)
     };
     alive.iter().filter_map(of).collect::<BTreeSet<_>>().into_iter().collect()
 }

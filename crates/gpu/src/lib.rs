@@ -13,6 +13,7 @@ pub mod device;
 mod edit;
 mod island;
 mod joint;
+mod joined;
 mod level;
 mod motion;
 mod narrowphase;

@@ -152,6 +152,8 @@ pub(crate) fn create(gpu: &Gpu, packed: &PackedScene, sizes: &Sizes, edits: u32)
     buffers.create(gpu, "step", size_of::<StepParams>() as u64, 1, uniform)?;
     buffers.create(gpu, "level_steps", 256, LEVELS.into(), uniform)?;
     buffers.create(gpu, "part_count", 4, 1, storage)?;
+    buffers.create(gpu, "apart", 8, 1, storage)?;
+    buffers.create(gpu, "joined", 8, 1, storage)?;
     buffers.create(gpu, "class_histogram", 4, 1024, storage)?;
     buffers.create(gpu, "dispatch_args", 16, args::COUNT, storage | BufferUsages::INDIRECT)?;
     buffers.create(gpu, "edit_records", size_of::<EditRecord>() as u64, edits.into(), storage)?;

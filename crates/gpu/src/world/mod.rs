@@ -6,6 +6,7 @@ mod results;
 
 use crate::broadphase::Choice;
 use crate::joint;
+use crate::joined::Joined;
 use crate::query::Query;
 use crate::readback::{Readback, read_now};
 use crate::stages::{Built, Stages};
@@ -42,6 +43,7 @@ pub struct World {
     buffers: Buffers,
     stages: Stages,
     sizes: Sizes,
+    joined: Joined,
     /// Records that the buffers of edits have room for.
     edit_room: u32,
     built: Built,
@@ -178,6 +180,7 @@ impl World {
             buffers,
             stages,
             sizes,
+            joined: Joined::default(),
             edit_room: room.edits,
             timer,
         })
@@ -356,7 +359,7 @@ impl World {
         let mut recorder = Recorder::new(&self.gpu, &self.buffers, &mut self.cache, timer);
         match record.idle {
             true => self.stages.record_idle(&mut recorder)?,
-            false => self.stages.record(&mut recorder, &self.buffers, &record.step)?,
+            false => self.stages.record(&mut recorder, &self.buffers, &record.step, &record.edits.joints)?,
         }
         self.statuses.copy(recorder.encoder(), self.buffers.buffer("control")?, 0);
         self.dispatches = recorder.dispatches();
@@ -370,6 +373,7 @@ impl World {
 
     fn upload(&mut self, record: &Record) -> Result<()> {
         let edits = &record.edits;
+        self.joined.upload(&self.gpu, &mut self.buffers, &edits.joints.topology)?;
         let queue = &self.gpu.queue;
         queue.write_buffer(self.buffers.buffer("step")?, 0, bytemuck::bytes_of(&record.step));
         for step in record.step.by_level() {
