@@ -79,18 +79,19 @@ impl Island {
         let first = info.first_joint as usize;
         self.works.clear();
         for &slot in &topology.joints[first..][..info.joint_count as usize] {
-            let joint = scene.set.joints[slot as usize];
+            let joint = &scene.set.joints[slot as usize];
             let [a, b] = [joint.body_a, joint.body_b].map(|body| vec3(scene.states[body as usize].position));
-            self.works.push(Work::new(joint, states[slot as usize], b - a, step.h));
+            self.works.push(Work::new(slot, joint, states[slot as usize], b - a, step.h));
         }
         self.stiffen(scene, step);
         for (work, &[a, b]) in self.works.iter_mut().zip(&self.ends) {
-            work.refresh(&self.bodies[a], &self.bodies[b]);
+            let joint = &scene.set.joints[work.slot as usize];
+            work.refresh(joint, &self.bodies[a], &self.bodies[b]);
             work.carry_impulses();
-            work.choose(&self.bodies[a], &self.bodies[b], step.h);
+            work.choose(joint, &self.bodies[a], &self.bodies[b], step.h);
             work.rebuild(&self.bodies[a], &self.bodies[b]);
         }
-        self.factor(topology);
+        self.factor(scene);
     }
 
     /// Reads the bodies as they are now.
@@ -131,11 +132,7 @@ impl Island {
             if new.inverse_mass == 0.0 {
                 continue;
             }
-            let (linear, angular) = (vec3(new.linear_velocity), vec3(new.angular_velocity));
-            new.linear_start = (vec3(new.linear_start) + (body.linear - linear)).to_array();
-            new.angular_start = (vec3(new.angular_start) + (body.angular - angular)).to_array();
-            new.linear_velocity = body.linear.to_array();
-            new.angular_velocity = body.angular.to_array();
+            new = body.put_velocities(new);
             if poses {
                 new.translation = body.pose.translation.to_array();
                 let start = quat(scene.states[slot as usize].rotation);
@@ -155,15 +152,15 @@ impl Island {
         let mut remainders = Vec::with_capacity(self.works.len());
         let mut changed = false;
         for (work, &[a, b]) in self.works.iter_mut().zip(&self.ends) {
-            let (a, b) = (&self.bodies[a], &self.bodies[b]);
-            work.look(a, b);
-            changed |= work.choose(a, b, step.h);
+            let (joint, a, b) = (&scene.set.joints[work.slot as usize], &self.bodies[a], &self.bodies[b]);
+            work.look(joint, a, b);
+            changed |= work.choose(joint, a, b, step.h);
             work.forget_impulses();
-            remainders.push(work.remainders(a, b, step.h));
+            remainders.push(work.remainders(joint, a, b, step.h));
         }
         for choice in 0..CHOICES {
             if changed {
-                self.rebuild(topology);
+                self.rebuild(scene);
             }
             for (work, &[a, b]) in self.works.iter_mut().zip(&self.ends) {
                 let [a, b] = pair(&mut self.bodies, a, b);
@@ -176,7 +173,8 @@ impl Island {
             changed = false;
             if choice + 1 < CHOICES {
                 for (work, &[a, b]) in self.works.iter_mut().zip(&self.ends) {
-                    changed |= work.choose(&self.bodies[a], &self.bodies[b], step.h);
+                    let joint = &scene.set.joints[work.slot as usize];
+                    changed |= work.choose(joint, &self.bodies[a], &self.bodies[b], step.h);
                 }
             }
             if !changed {
@@ -193,10 +191,10 @@ impl Island {
         self.works.iter_mut().for_each(Work::keep_impulses);
         self.stiffen(scene, step);
         for (work, &[a, b]) in self.works.iter_mut().zip(&self.ends) {
-            work.refresh(&self.bodies[a], &self.bodies[b]);
+            work.refresh(&scene.set.joints[work.slot as usize], &self.bodies[a], &self.bodies[b]);
         }
-        self.factor(topology);
-        self.project(topology);
+        self.factor(scene);
+        self.project(scene);
         self.solve_rows(topology, |island, joint, which| {
             let [a, b] = island.ends[joint];
             island.works[joint].lack(which, &island.bodies[a], &island.bodies[b], true)
@@ -206,15 +204,15 @@ impl Island {
     }
 
     /// What lasts of the joints after a step.
-    pub fn states(&self, step: &StepParams) -> impl Iterator<Item = JointState> {
-        self.works.iter().map(|work| work.lasting(step))
+    pub fn states(&self, set: &JointSet, step: &StepParams) -> impl Iterator<Item = JointState> {
+        self.works.iter().map(|work| work.lasting(&set.joints[work.slot as usize], step))
     }
 
-    fn rebuild(&mut self, topology: &Topology) {
+    fn rebuild(&mut self, scene: &Scene<'_>) {
         for (work, &[a, b]) in self.works.iter_mut().zip(&self.ends) {
             work.rebuild(&self.bodies[a], &self.bodies[b]);
         }
-        self.factor(topology);
+        self.factor(scene);
     }
 
     /// The bodies' inertia with the geometric stiffness of their joints.
@@ -228,7 +226,7 @@ impl Island {
             let mut more = Mat3::ZERO;
             for &end in at {
                 let work = &self.works[end as usize / 2];
-                let arm = own_arm(&work.joint, end & 1 == 1, body.pose.rotation);
+                let arm = own_arm(&scene.set.joints[work.slot as usize], end & 1 == 1, body.pose.rotation);
                 let impulse = vec3(work.state.impulse);
                 more += stiffening(arm, if end & 1 == 1 { impulse } else { -impulse }, step.h);
             }
@@ -237,7 +235,8 @@ impl Island {
     }
 
     /// Assembles and factors K: level by level, each block of a level by itself.
-    fn factor(&mut self, topology: &Topology) {
+    fn factor(&mut self, scene: &Scene<'_>) {
+        let topology = &*scene.set.topology;
         let Some(info) = self.info else { return };
         let blocks = &topology.blocks[info.first_block as usize..][..info.block_count as usize];
         let first_entry = blocks.first().map_or(0, |block| block.first_entry) as usize;
@@ -246,7 +245,7 @@ impl Island {
         self.upper.resize(entry_count, Mat3::ZERO);
         self.lower.resize(entry_count, Mat3::ZERO);
         for (k, block) in blocks.iter().enumerate() {
-            let mut diagonal = self.diagonal_of(&info, block);
+            let mut diagonal = self.diagonal_of(scene, &info, block);
             for [row, column] in &topology.terms[block.first_term as usize..][..block.term_count as usize] {
                 let (row, column) = (*row as usize - first_entry, *column as usize - first_entry);
                 diagonal -= self.lower[row] * self.upper[column].transpose();
@@ -254,7 +253,7 @@ impl Island {
             self.diagonal[k] = diagonal.inverse();
             for index in block.first_entry as usize..(block.first_entry + block.entry_count) as usize {
                 let entry = &topology.entries[index];
-                let mut value = self.entry_of(&info, topology, entry);
+                let mut value = self.entry_of(scene, &info, entry);
                 for [row, column] in &topology.terms[entry.first_term as usize..][..entry.term_count as usize] {
                     let (row, column) = (*row as usize - first_entry, *column as usize - first_entry);
                     value -= self.lower[row] * self.upper[column].transpose();
@@ -265,26 +264,28 @@ impl Island {
         }
     }
 
-    fn diagonal_of(&self, info: &JointIsland, block: &JointBlock) -> Mat3 {
+    fn diagonal_of(&self, scene: &Scene<'_>, info: &JointIsland, block: &JointBlock) -> Mat3 {
         let (joint, which) = place(info, block.row);
         let work = &self.works[joint];
         let [a, b] = self.ends[joint];
-        let in_cycle = work.joint.flags & joint_bits::IN_CYCLE != 0;
+        let in_cycle = scene.set.joints[work.slot as usize].flags & joint_bits::IN_CYCLE != 0;
         let more = if in_cycle { CYCLE_REGULARIZATION } else { REGULARIZATION };
         work.blocks[which].diagonal(&self.bodies[a], &self.bodies[b], more)
     }
 
     /// What impulses of the column's rows do to the velocities of the row's, by the bodies that both joints hold.
-    fn entry_of(&self, info: &JointIsland, topology: &Topology, entry: &JointEntry) -> Mat3 {
+    fn entry_of(&self, scene: &Scene<'_>, info: &JointIsland, entry: &JointEntry) -> Mat3 {
+        let topology = &*scene.set.topology;
         let (i, row) = place(info, topology.blocks[entry.row as usize].row);
         let (j, column) = place(info, topology.blocks[entry.column as usize].row);
+        let slots = [i, j].map(|joint| self.works[joint].slot as usize);
+        let first = slots.map(|slot| scene.set.joints[slot].body_a);
         let (row, column) = (&self.works[i].blocks[row], &self.works[j].blocks[column]);
         let mut value = Mat3::ZERO;
         for slot in entry.shared.into_iter().filter(|&slot| slot != NO_BODY) {
-            let first = |joint: usize| self.works[joint].joint.body_a == slot;
-            let (turn, turn_sign) = if first(i) { (row.turn_a, -1.0) } else { (row.turn_b, 1.0) };
-            let (response, sign) = if first(j) { (column.response_a, -1.0) } else { (column.response_b, 1.0) };
-            let index = self.ends[i][usize::from(!first(i))];
+            let (turn, turn_sign) = if first[0] == slot { (row.turn_a, -1.0) } else { (row.turn_b, 1.0) };
+            let (response, sign) = if first[1] == slot { (column.response_a, -1.0) } else { (column.response_b, 1.0) };
+            let index = self.ends[i][usize::from(first[0] != slot)];
             let along = row.along.transpose() * column.along * self.bodies[index].inverse_mass;
             value += (along + turn.transpose() * response) * (turn_sign * sign);
         }
@@ -333,8 +334,12 @@ impl Island {
     }
 
     /// Moves the bodies to where the hard rows hold, as far as one linear step leads; velocities stay.
-    fn project(&mut self, topology: &Topology) {
-        self.substitute(topology, |island, joint, which| -island.works[joint].off(which));
+    fn project(&mut self, scene: &Scene<'_>) {
+        let topology = &*scene.set.topology;
+        self.substitute(topology, |island, joint, which| {
+            let work = &island.works[joint];
+            -work.off(&scene.set.joints[work.slot as usize], which)
+        });
         let Some(info) = self.info else { return };
         let still = |body: &Body| Body { linear: Vec3::ZERO, angular: Vec3::ZERO, ..*body };
         let mut moved: Vec<Body> = self.bodies.iter().map(still).collect();

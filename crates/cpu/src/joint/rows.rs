@@ -43,6 +43,16 @@ impl Body {
         }
     }
 
+    /// The solver's body with these velocities; what joints add to them is no load of contacts.
+    pub fn put_velocities(&self, mut body: SolverBody) -> SolverBody {
+        let (linear, angular) = (vec3(body.linear_velocity), vec3(body.angular_velocity));
+        body.linear_start = (vec3(body.linear_start) + (self.linear - linear)).to_array();
+        body.angular_start = (vec3(body.angular_start) + (self.angular - angular)).to_array();
+        body.linear_velocity = self.linear.to_array();
+        body.angular_velocity = self.angular.to_array();
+        body
+    }
+
     /// Where it is after h, as far as its velocities tell.
     fn predicted(&self, h: f32) -> Pose {
         let half = 0.5 * h * self.angular;
@@ -85,8 +95,10 @@ impl Default for Piece {
 /// A joint in a step.
 #[derive(Debug, Clone, Copy)]
 pub struct Work {
-    /// What it is.
-    pub joint: Joint,
+    /// Its slot.
+    pub slot: u32,
+    /// Its axes, see [`joint_bits`]; none once it is broken.
+    pub axes: u32,
     /// What lasts of it.
     pub state: JointState,
     /// From the first centre of mass to the second one when the step began, m.
@@ -129,20 +141,17 @@ impl Block {
 
 impl Work {
     /// A joint at the beginning of a step with sub-steps of length `h`.
-    pub fn new(joint: Joint, state: JointState, between: Vec3, h: f32) -> Self {
+    pub fn new(slot: u32, joint: &Joint, state: JointState, between: Vec3, h: f32) -> Self {
         let fresh = JointState { tag: joint.generation + 1, h, ..JointState::zeroed() };
         let mut state = if state.tag == fresh.tag { state } else { fresh };
         let scale = if state.h == h || state.h == 0.0 { 1.0 } else { h / state.h };
         state.impulse = state.impulse.map(|x| scale * x);
         state.torque = state.torque.map(|x| scale * x);
         state.h = h;
-        let mut joint = joint;
-        if state.broken != 0 {
-            joint.axes = 0;
-        }
+        let axes = if state.broken != 0 { 0 } else { joint.axes };
         let still = Pose { translation: Vec3::ZERO, rotation: Quat::IDENTITY };
         let blocks = [Block::default(); 2];
-        Self { joint, state, between, frame: frame(&joint, &still, &still, between), blocks }
+        Self { slot, axes, state, between, frame: frame(joint, &still, &still, between), blocks }
     }
 
     /// The impulses of the last sub-step, in the axes as they are now.
@@ -157,14 +166,14 @@ impl Work {
     }
 
     /// Takes the coordinates from the poses; axes and rows stay those of the factor.
-    pub fn look(&mut self, a: &Body, b: &Body) {
-        let now = frame(&self.joint, &a.pose, &b.pose, self.between);
+    pub fn look(&mut self, joint: &Joint, a: &Body, b: &Body) {
+        let now = frame(joint, &a.pose, &b.pose, self.between);
         (self.frame.shift, self.frame.turn) = (now.shift, now.turn);
     }
 
     /// Takes axes, coordinates and rows from the poses; pieces stay as they were.
-    pub fn refresh(&mut self, a: &Body, b: &Body) {
-        self.frame = frame(&self.joint, &a.pose, &b.pose, self.between);
+    pub fn refresh(&mut self, joint: &Joint, a: &Body, b: &Body) {
+        self.frame = frame(joint, &a.pose, &b.pose, self.between);
         self.rebuild(a, b);
     }
 
@@ -174,7 +183,7 @@ impl Work {
         let masses = a.inverse_mass + b.inverse_mass;
         for (which, block) in self.blocks.iter_mut().enumerate() {
             let rows =
-                self.joint.axes >> (3 * which) & 7 | self.joint.axes >> (joint_bits::DRIVEN + 3 * which as u32) & 7;
+                self.axes >> (3 * which) & 7 | self.axes >> (joint_bits::DRIVEN + 3 * which as u32) & 7;
             for row in 0..3 {
                 let axis = if rows >> row & 1 == 0 {
                     Vec3::ZERO
@@ -199,14 +208,14 @@ impl Work {
     }
 
     /// Chooses the pieces of all rows for the velocities and impulses as they are. Whether the system is another one by it.
-    pub fn choose(&mut self, a: &Body, b: &Body, h: f32) -> bool {
+    pub fn choose(&mut self, joint: &Joint, a: &Body, b: &Body, h: f32) -> bool {
         let mut changed = false;
         for axis in 0..6 {
-            if (self.joint.axes | self.joint.axes >> joint_bits::DRIVEN) >> axis & 1 == 0 {
+            if (self.axes | self.axes >> joint_bits::DRIVEN) >> axis & 1 == 0 {
                 continue;
             }
             let (which, row) = (axis / 3, axis % 3);
-            let mut new = piece(&self.joint, axis, &self.at(which, row, a, b), h);
+            let mut new = piece(joint, axis, &self.at(which, row, a, b), h);
             let piece = &mut self.blocks[which].pieces[row];
             if piece.kind == new.kind && (piece.gamma - new.gamma).abs() <= SAME_SPRING * piece.gamma {
                 // Its goal goes with either.
@@ -274,8 +283,8 @@ impl Work {
 
     /// By how much the separation of the locked rows will be off what is linear, as far as it is to be believed: spins
     /// make it wrong, unless it is as it was in the last sub-step.
-    pub fn remainders(&mut self, a: &Body, b: &Body, h: f32) -> [Vec3; 2] {
-        let next = frame(&self.joint, &a.predicted(h), &b.predicted(h), self.between);
+    pub fn remainders(&mut self, joint: &Joint, a: &Body, b: &Body, h: f32) -> [Vec3; 2] {
+        let next = frame(joint, &a.predicted(h), &b.predicted(h), self.between);
         let now = self.frame;
         let spin = h * a.angular.length().max(b.angular.length()) / THETA;
         let still = 1.0 / (1.0 + spin * spin * spin * spin);
@@ -301,12 +310,12 @@ impl Work {
     }
 
     /// What a projection of the poses is to take out, m and rad.
-    pub fn off(&self, which: usize) -> Vec3 {
+    pub fn off(&self, joint: &Joint, which: usize) -> Vec3 {
         let mut off = Vec3::ZERO;
         for row in 0..3 {
             let axis = 3 * which + row;
             let coordinate = if which == 0 { self.frame.shift[row] } else { self.frame.turn[row] };
-            let drive = &self.joint.drives[axis];
+            let drive = &joint.drives[axis];
             off[row] = match self.blocks[which].pieces[row].kind {
                 // Of an axis that is locked by equal limits, those; else zero.
                 kind::LOCKED | kind::LOW => coordinate - drive.low,
@@ -318,17 +327,17 @@ impl Work {
     }
 
     /// What lasts of the joint after a step: it breaks where its last sub-step asked for too much.
-    pub fn lasting(&self, step: &StepParams) -> JointState {
+    pub fn lasting(&self, joint: &Joint, step: &StepParams) -> JointState {
         let force = vec3(self.state.impulse).length() * step.inverse_h;
         let torque = vec3(self.state.torque).length() * step.inverse_h;
-        let breaks = force > self.joint.break_force || torque > self.joint.break_torque;
+        let breaks = force > joint.break_force || torque > joint.break_torque;
         let (mut separation, mut angle) = (Vec3::ZERO, Vec3::ZERO);
         for row in 0..3 {
             if self.blocks[0].pieces[row].kind == kind::LOCKED {
-                separation[row] = self.frame.shift[row] - self.joint.drives[row].low;
+                separation[row] = self.frame.shift[row] - joint.drives[row].low;
             }
             if self.blocks[1].pieces[row].kind == kind::LOCKED {
-                angle[row] = self.frame.turn[row] - self.joint.drives[3 + row].low;
+                angle[row] = self.frame.turn[row] - joint.drives[3 + row].low;
             }
         }
         JointState {

@@ -281,7 +281,7 @@ enum Pass {
     Bodies(BodyPass),
     /// A visit to every constraint.
     Sweep(Visit),
-    /// A part of a sub-step of every island of joints.
+    /// A part of a sub-step of joints.
     Joints(joint::Part),
 }
 
@@ -320,27 +320,37 @@ fn takes_part(body: &SolverBody, state: &BodyState, step: &StepParams) -> bool {
     body.level == step.level || !moves(state.flags)
 }
 
+/// What a step begins with.
+const BEGIN_JOINTS: [Part; 3] = [Part::Begin, Part::BeginLoose, Part::Stiffen];
+/// Before contacts.
+const SOLVE_JOINTS: [Part; 3] = [Part::Solve, Part::WarmStartLoose, Part::SolveLoose];
+/// After bodies have moved.
+const RELAX_JOINTS: [Part; 3] = [Part::Relax, Part::Stiffen, Part::RelaxLoose];
+
+fn joint_passes(joints: bool, parts: &[Part]) -> impl Iterator<Item = Pass> {
+    parts.iter().filter(move |_| joints).map(|&part| Pass::Joints(part))
+}
+
 /// The passes of one level of a step, in order. Joints come before contacts, and once more after bodies have moved.
 fn schedule(step: &StepParams, restitution: bool, joints: bool) -> Vec<Pass> {
     use Pass::{Bodies, Sweep};
     let mut passes = Vec::new();
-    let part = |part| joints.then_some(Pass::Joints(part));
     if step.levels.trailing_zeros() < step.level {
         passes.push(Bodies(motion::rewind));
     }
-    passes.extend(part(Part::Begin));
+    passes.extend(joint_passes(joints, &BEGIN_JOINTS));
     match step.solver {
         solver::ONE_PASS => {
             passes.extend([Bodies(motion::first_substep), Sweep(Visit::Load)]);
             for substep in 1..=step.substeps {
-                passes.extend(part(Part::Solve));
+                passes.extend(joint_passes(joints, &SOLVE_JOINTS));
                 passes.push(Sweep(Visit::Pass));
                 match (joints, substep < step.substeps) {
                     (false, true) => passes.push(Bodies(motion::next_substep)),
                     (false, false) => passes.push(Bodies(motion::last_substep)),
                     (true, next) => {
                         passes.push(Bodies(if next { motion::move_body } else { motion::move_last }));
-                        passes.push(Pass::Joints(Part::Relax));
+                        passes.extend(joint_passes(true, &RELAX_JOINTS));
                         passes.extend(next.then_some(Bodies(motion::start_next)));
                     }
                 }
@@ -364,11 +374,9 @@ fn substep(step: &StepParams, joints: bool) -> Vec<Pass> {
     use Pass::{Bodies, Sweep};
     let start = [Bodies(motion::integrate_velocity), Sweep(Visit::WarmStart)];
     let again = step.iterations.saturating_sub(1) as usize;
-    let solve = joints.then_some(Pass::Joints(Part::Solve));
-    let positions: &[Pass] = match joints {
-        true => &[Bodies(motion::move_body), Pass::Joints(Part::Relax)],
-        false => &[Bodies(motion::integrate_position)],
-    };
+    let solve: Vec<_> = joint_passes(joints, &SOLVE_JOINTS).collect();
+    let mut positions = vec![Bodies(if joints { motion::move_body } else { motion::integrate_position })];
+    positions.extend(joint_passes(joints, &RELAX_JOINTS));
     let mut passes = Vec::new();
     match step.solver {
         solver::SOFT => {
