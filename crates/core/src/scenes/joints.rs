@@ -112,7 +112,7 @@ pub fn rope_bridge(planks: usize) -> Scene {
         let u = i as f32 / planks.max(1) as f32;
         TOP + Vec3::new(STEP * i as f32, -0.35 * STEP * planks as f32 * u * (1.0 - u), 0.0)
     };
-    let mut tie = |scene: &mut Scene, a, b, at: Vec3| {
+    let tie = |scene: &mut Scene, a, b, at: Vec3| {
         for side in [-0.6f32, 0.6] {
             join(scene, a, b, JointBuilder::spherical(), at + Vec3::Z * side);
         }
