@@ -40,7 +40,9 @@ fn explore() {
         ("car", scenes::car().0, 600),
         ("cardan", scenes::cardan(0.5, 5.0).scene, 600),
     ];
-    for (name, scene, steps) in cases.into_iter().filter(|c| which.is_empty() || which.split(',').any(|w| c.0.starts_with(w))) {
+    for (name, scene, steps) in
+        cases.into_iter().filter(|c| which.is_empty() || which.split(',').any(|w| c.0.starts_with(w)))
+    {
         for by in [By::Cpu, By::Rapier] {
             let t = std::time::Instant::now();
             let w = std::panic::catch_unwind(|| watch(&scene, by, params(4), steps));
@@ -48,7 +50,6 @@ fn explore() {
         }
     }
 }
-
 
 fn bars(n: u32, short: f32, thick: f32, speed: f32, damping: f32, start: bool, z: bool) {
     let mut scene = Scene::new();
@@ -66,49 +67,79 @@ fn bars(n: u32, short: f32, thick: f32, speed: f32, damping: f32, start: bool, z
         let half = Vec3::new(0.5 * way.length() - short, thick, thick);
         let turn = Quat::from_rotation_arc(Vec3::X, way.normalize());
         let v = Vec3::Z.cross(0.5 * way) * w;
-        scene.insert(RigidBodyBuilder::dynamic().translation(0.5 * (from + to)).rotation(turn).angvel(Vec3::Z * w).linvel(v), ColliderBuilder::cuboid(half.x, half.y, half.z).density(1000.0)).body
+        scene
+            .insert(
+                RigidBodyBuilder::dynamic().translation(0.5 * (from + to)).rotation(turn).angvel(Vec3::Z * w).linvel(v),
+                ColliderBuilder::cuboid(half.x, half.y, half.z).density(1000.0),
+            )
+            .body
     };
-    let [crank, coupler, rocker] = [bar(Vec3::ZERO, tip, if start { speed } else { 0.0 }), bar(tip, knee, 0.0), bar(foot, knee, 0.0)];
+    let [crank, coupler, rocker] =
+        [bar(Vec3::ZERO, tip, if start { speed } else { 0.0 }), bar(tip, knee, 0.0), bar(foot, knee, 0.0)];
     let mut joints = vec![];
     let mut join = |a, b, joint: JointBuilder, at: Vec3| {
-        let local = |body| { let x = scene.body(body).unwrap(); x.rotation.inverse() * (at - x.translation) };
+        let local = |body| {
+            let x = scene.body(body).unwrap();
+            x.rotation.inverse() * (at - x.translation)
+        };
         let joint = joint.local_anchor1(local(a)).local_anchor2(local(b));
         let j = scene.insert_joint(a, b, joint).unwrap();
         joints.push(j);
     };
     let hinge = JointBuilder::revolute(Vec3::Z);
-    let driven = if damping > 0.0 { hinge.clone().motor_velocity(JointAxis::AngX, speed, damping) } else { hinge.clone() };
+    let driven =
+        if damping > 0.0 { hinge.clone().motor_velocity(JointAxis::AngX, speed, damping) } else { hinge.clone() };
     join(fixed, crank, driven, Vec3::ZERO);
     join(crank, coupler, if z { JointBuilder::spherical() } else { hinge.clone() }, tip);
     join(coupler, rocker, if z { JointBuilder::spherical() } else { hinge.clone() }, knee);
     join(fixed, rocker, hinge, foot);
     let mut world = World::new(scene.clone(), params(n), Backend::Cpu).unwrap();
-    let mut worst: f64 = 0.0; let mut when = 0;
+    let mut worst: f64 = 0.0;
+    let mut when = 0;
     for step in 1..=600 {
         world.step().unwrap();
         let e = tumble_core::measures::joint_error(&scene, &world.poses().unwrap());
-        if e.max_m > worst { worst = e.max_m; when = step; }
+        if e.max_m > worst {
+            worst = e.max_m;
+            when = step;
+        }
     }
-    println!("n {n} short {short} thick {thick} speed {speed} damping {damping} start {start} balls {z}: worst {worst} at {when}");
+    println!(
+        "n {n} short {short} thick {thick} speed {speed} damping {damping} start {start} balls {z}: worst {worst} at {when}"
+    );
 }
 
 #[test]
 fn trouble() {
     for n in [4, 8, 16] {
-    for (short, thick) in [(0.03, 0.02), (0.1, 0.02), (0.14, 0.02)] {
-        for (speed, damping, start, z) in [(5.0, 1e4, false, false), (5.0, 1e4, true, false), (5.0, 1e4, true, true), (5.0, 100.0, true, false), (1.0, 1e4, true, false), (1.0, 0.0, true, false)] {
-            bars(n, short, thick, speed, damping, start, z);
+        for (short, thick) in [(0.03, 0.02), (0.1, 0.02), (0.14, 0.02)] {
+            for (speed, damping, start, z) in [
+                (5.0, 1e4, false, false),
+                (5.0, 1e4, true, false),
+                (5.0, 1e4, true, true),
+                (5.0, 100.0, true, false),
+                (1.0, 1e4, true, false),
+                (1.0, 0.0, true, false),
+            ] {
+                bars(n, short, thick, speed, damping, start, z);
+            }
         }
-    }
     }
     for (name, half) in [("deep", 0.08f32), ("touch", 0.099)] {
         for joint in [JointBuilder::spherical(), JointBuilder::fixed(), JointBuilder::revolute(Vec3::Z)] {
-        let mut scene = Scene::new();
-        let a = scene.insert(RigidBodyBuilder::dynamic(), ColliderBuilder::cuboid(0.1, 0.1, 0.1)).body;
-        let b = scene.insert(RigidBodyBuilder::dynamic().translation(Vec3::X * 2.0 * half), ColliderBuilder::cuboid(0.1, 0.1, 0.1)).body;
-        let locked = joint.locked;
-        scene.insert_joint(a, b, joint.local_anchor1(Vec3::X * half).local_anchor2(Vec3::X * -half)).unwrap();
-        for n in [4, 8] { println!("{name} {locked:?} {n} {:?}", watch(&scene, By::Cpu, params(n), 120)); }
+            let mut scene = Scene::new();
+            let a = scene.insert(RigidBodyBuilder::dynamic(), ColliderBuilder::cuboid(0.1, 0.1, 0.1)).body;
+            let b = scene
+                .insert(
+                    RigidBodyBuilder::dynamic().translation(Vec3::X * 2.0 * half),
+                    ColliderBuilder::cuboid(0.1, 0.1, 0.1),
+                )
+                .body;
+            let locked = joint.locked;
+            scene.insert_joint(a, b, joint.local_anchor1(Vec3::X * half).local_anchor2(Vec3::X * -half)).unwrap();
+            for n in [4, 8] {
+                println!("{name} {locked:?} {n} {:?}", watch(&scene, By::Cpu, params(n), 120));
+            }
         }
     }
 }

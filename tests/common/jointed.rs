@@ -2,7 +2,7 @@
 
 use crate::beside::Any;
 use tumble::prelude::*;
-use tumble_bench::hard_cases::By;
+use tumble_bench::hard_cases::{Ask, By, Case};
 use tumble_core::{Accuracy, JointSolver, measures};
 
 /// Sides of tumble that joints are tested on.
@@ -46,7 +46,8 @@ pub(crate) fn watch(scene: &Scene, by: By, params: Params, steps: usize) -> Watc
     let mut world = Any::new(by, scene, params);
     let (poses, velocities) = (measures::initial_poses(scene), measures::initial_velocities(scene));
     let start: f64 = energy(scene, &poses, &velocities).iter().sum();
-    let (mut apart, mut late, mut angle, mut most, mut fastest): (f64, f64, f64, f64, f64) = (0.0, 0.0, 0.0, start, 1e-9);
+    let (mut apart, mut late, mut angle, mut most, mut fastest): (f64, f64, f64, f64, f64) =
+        (0.0, 0.0, 0.0, start, 1e-9);
     let (mut end, mut deepest, mut resting) = (start, 0.0f64, 0.0);
     let mass: f64 = scene.bodies().map(|b| f64::from(scene.mass_properties(b).expect("living").mass)).sum();
     for step in 1..=steps {
@@ -92,4 +93,28 @@ pub(crate) fn coordinates(world: &mut World, joint: JointHandle) -> [f64; 6] {
 /// With Gauss-Seidel alone.
 pub(crate) fn gauss_seidel(substeps: u32) -> Params {
     Params { joints: JointSolver::GaussSeidel, ..params(substeps) }
+}
+
+/// Records a number, and says what does not hold of it on one of our sides.
+pub(crate) fn row(
+    case: &Case,
+    by: By,
+    substeps: u32,
+    quantity: &str,
+    unit: &str,
+    value: f64,
+    ask: Ask,
+) -> Result<(), String> {
+    let ask = if by == By::Rapier && !matches!(ask, Ask::Beside(_)) { Ask::Said } else { ask };
+    if case.row(by, substeps, quantity, unit, value, ask) {
+        return Ok(());
+    }
+    Err(format!("{}: {by:?}: {quantity}: {value} {unit} for {ask:?}", case.name()))
+}
+
+/// What does not hold of our sides, told at once.
+#[track_caller]
+pub(crate) fn all_held(held: Vec<Result<(), String>>) {
+    let missed: Vec<String> = held.into_iter().filter_map(Result::err).collect();
+    assert!(missed.is_empty(), "{missed:#?}");
 }

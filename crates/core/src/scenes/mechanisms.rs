@@ -127,7 +127,7 @@ pub struct FourBar {
     pub motor: JointHandle,
 }
 
-/// One [`FourBar`], the motor at `speed` (rad/s), which the crank has from the start.
+/// One [`FourBar`], the motor at `speed` (rad/s), with which the linkage begins.
 pub fn four_bar(speed: f32) -> (Scene, FourBar) {
     let mut scene = Scene::new();
     let linkage = add_four_bar(&mut scene, Vec3::ZERO, speed);
@@ -153,16 +153,24 @@ fn add_four_bar(scene: &mut Scene, at: Vec3, speed: f32) -> FourBar {
     let up = (b * b - along * along).sqrt();
     let unit = way / distance;
     let knee = tip + unit * along + Vec3::new(-unit.y, unit.x, 0.0) * up;
-    let mut bar = |from: Vec3, to: Vec3| {
-        let way = to - from;
+    // The knee goes round with the rocker and with the coupler: two equations for their speeds.
+    let (tip_velocity, coupler_way, rocker_way) = (Vec3::Z.cross(tip) * speed, knee - tip, knee - foot);
+    let sine = Vec3::Z.cross(rocker_way).dot(coupler_way);
+    let rocker_speed = tip_velocity.dot(coupler_way) / sine;
+    let coupler_speed = tip_velocity.dot(rocker_way) / sine;
+    let mut bar = |from: Vec3, way: Vec3, velocity: Vec3, spin: f32| {
         let half = Vec3::new(0.5 * way.length() - 0.03, 0.02, 0.02);
         let turn = Quat::from_rotation_arc(Vec3::X, way.normalize());
-        scene.insert(dynamic(at + 0.5 * (from + to)).rotation(turn), cuboid(half)).body
+        let about = Vec3::Z * spin;
+        let middle = dynamic(at + from + 0.5 * way).linvel(velocity + about.cross(0.5 * way));
+        scene.insert(middle.angvel(about).rotation(turn), cuboid(half)).body
     };
-    let [crank, coupler, rocker] = [bar(Vec3::ZERO, tip), bar(tip, knee), bar(foot, knee)];
+    let crank = bar(Vec3::ZERO, tip, Vec3::ZERO, speed);
+    let coupler = bar(tip, coupler_way, tip_velocity, coupler_speed);
+    let rocker = bar(foot, rocker_way, Vec3::ZERO, rocker_speed);
     let fixed = anchor(scene, at);
     let hinge = JointBuilder::revolute(Vec3::Z);
-    let driven = hinge.clone().motor_velocity(JointAxis::AngX, speed, 1e4);
+    let driven = hinge.clone().motor_velocity(JointAxis::AngX, speed, 1e6);
     let motor = join(scene, fixed, crank, driven, at);
     join(scene, crank, coupler, hinge.clone(), at + tip);
     join(scene, coupler, rocker, hinge.clone(), at + knee);
@@ -226,7 +234,8 @@ fn add_car(scene: &mut Scene, z: f32) -> BodyHandle {
         join(scene, chassis, hub, slider, inner);
         // About -z, so that it rolls along +x.
         let axle = JointBuilder::revolute(Vec3::NEG_Z)
-            .motor_velocity(JointAxis::AngX, 15.0, 5.0)
+            .motor_velocity(JointAxis::AngX, 15.0, 100.0)
+            .motor_model(JointAxis::AngX, MotorModel::ForceBased)
             .motor_max_force(JointAxis::AngX, 150.0);
         join(scene, hub, wheel, axle, at);
     }
