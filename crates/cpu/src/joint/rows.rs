@@ -333,7 +333,7 @@ impl Work {
             let block = &self.blocks[which];
             let mut off = way / h - block.velocity(a, b);
             for row in 0..3 {
-                if block.pieces[row].kind != kind::LOCKED {
+                if !matches!(block.pieces[row].kind, kind::LOCKED | kind::LOW | kind::HIGH) {
                     off[row] = 0.0;
                 }
             }
