@@ -10,6 +10,9 @@ const BODY_FROZEN: u32 = 4u;
 const BODY_ASLEEP: u32 = 8u;
 const BODY_STAYS_AWAKE: u32 = 16u;
 
+const TOUCHED_CONTACT: u32 = 1u;
+const TOUCHED_JOINED: u32 = 2u;
+
 struct BodyState {
     position: vec3<f32>,
     flags: u32,
