@@ -241,6 +241,10 @@ impl Work {
             let (which, row) = (axis / 3, axis % 3);
             let mut new = piece(joint, axis, &self.at(which, row, a, b), h);
             let piece = &mut self.blocks[which].pieces[row];
+            let across = |from: u32, to: u32| piece.kind == from && new.kind == to;
+            if across(kind::LOW, kind::HIGH) || across(kind::HIGH, kind::LOW) {
+                new = Piece { kind: kind::FIXED, gamma: 0.0, goal: 0.0, off: 0.0 };
+            }
             if piece.kind == new.kind && (piece.gamma - new.gamma).abs() <= SAME_SPRING * piece.gamma {
                 // Its goal goes with either.
                 new.gamma = piece.gamma;
@@ -357,8 +361,9 @@ impl Work {
             let drive = &joint.drives[axis];
             off[row] = match self.blocks[which].pieces[row].kind {
                 // Of an axis that is locked by equal limits, those; else zero.
-                kind::LOCKED | kind::LOW => coordinate - drive.low,
-                kind::HIGH => coordinate - drive.high,
+                kind::LOCKED => coordinate - drive.low,
+                kind::LOW => (coordinate - drive.low).min(0.0),
+                kind::HIGH => (coordinate - drive.high).max(0.0),
                 _ => 0.0,
             };
         }
