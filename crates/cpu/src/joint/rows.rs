@@ -239,12 +239,9 @@ impl Work {
                 continue;
             }
             let (which, row) = (axis / 3, axis % 3);
-            let mut new = piece(joint, axis, &self.at(which, row, a, b), h);
+            let was = self.blocks[which].pieces[row].kind;
+            let mut new = piece(joint, axis, &self.at(which, row, a, b), h, was);
             let piece = &mut self.blocks[which].pieces[row];
-            let across = |from: u32, to: u32| piece.kind == from && new.kind == to;
-            if across(kind::LOW, kind::HIGH) || across(kind::HIGH, kind::LOW) {
-                new = Piece { kind: kind::FIXED, gamma: 0.0, goal: 0.0, off: 0.0 };
-            }
             if piece.kind == new.kind && (piece.gamma - new.gamma).abs() <= SAME_SPRING * piece.gamma {
                 // Its goal goes with either.
                 new.gamma = piece.gamma;
