@@ -5,7 +5,7 @@
 //! velocities is off by the remainder d, which is taken in where it is small or smooth.
 
 use super::drive::{AxisState, Piece, kind, piece};
-use super::frame::{Frame, Pose, frame};
+use super::frame::{Frame, Pose, frame, used};
 use crate::math::{quat, rotate, vec3};
 use bytemuck::Zeroable;
 use glam::{Mat3, Quat, Vec3};
@@ -206,8 +206,8 @@ impl Work {
     pub fn rebuild(&mut self, a: &Body, b: &Body) {
         let Frame { arm_a, arm_b, along, about, .. } = self.frame;
         let masses = a.inverse_mass + b.inverse_mass;
-        for (which, block) in self.blocks.iter_mut().enumerate() {
-            let rows = self.axes >> (3 * which) & 7 | self.axes >> (joint_bits::DRIVEN + 3 * which as u32) & 7;
+        for (which, block) in self.blocks.iter_mut().enumerate().filter(|(which, _)| used(self.axes, *which) != 0) {
+            let rows = used(self.axes, which);
             for row in 0..3 {
                 let axis = if rows >> row & 1 == 0 {
                     Vec3::ZERO
@@ -254,7 +254,7 @@ impl Work {
 
     /// Gives a body what the rows give now.
     pub fn push(&self, second: bool, body: &mut Body) {
-        for block in &self.blocks {
+        for (_, block) in self.blocks.iter().enumerate().filter(|(which, _)| used(self.axes, *which) != 0) {
             let along = block.along * block.push;
             if second {
                 body.linear += body.inverse_mass * along;
@@ -268,7 +268,7 @@ impl Work {
 
     /// What rows of a fixed impulse are still to give; others give nothing.
     pub fn fix(&mut self) {
-        for block in &mut self.blocks {
+        for (_, block) in self.blocks.iter_mut().enumerate().filter(|(which, _)| used(self.axes, *which) != 0) {
             for row in 0..3 {
                 let fixed = block.pieces[row].kind == kind::FIXED;
                 block.push[row] = if fixed { block.pieces[row].goal - block.impulse[row] } else { 0.0 };
@@ -279,6 +279,9 @@ impl Work {
 
     /// Gives a body what rows of a fixed impulse give now: they are in no block of the system.
     pub fn push_fixed(&self, second: bool, body: &mut Body) {
+        if self.blocks[0].push == Vec3::ZERO && self.blocks[1].push == Vec3::ZERO {
+            return;
+        }
         let push = self.frame.along * self.blocks[0].push;
         let arm = if second { self.frame.arm_b } else { self.frame.arm_a };
         let turn = body.inverse_inertia * (arm.cross(push) + self.frame.about * self.blocks[1].push);
@@ -329,7 +332,7 @@ impl Work {
         let spin = h * a.angular.length().max(b.angular.length()) / THETA;
         let still = 1.0 / (1.0 + spin * spin * spin * spin);
         let mut remainders = [Vec3::ZERO; 2];
-        for which in 0..2 {
+        for which in (0..2).filter(|&which| used(self.axes, which) != 0) {
             let way = if which == 0 { next.shift - now.shift } else { next.turn - now.turn };
             let block = &self.blocks[which];
             let mut off = way / h - block.velocity(a, b);
