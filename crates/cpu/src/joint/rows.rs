@@ -252,7 +252,8 @@ impl Work {
                 continue;
             }
             let (which, row) = (axis / 3, axis % 3);
-            let mut new = piece(joint, axis, &self.at(which, row, a, b), h);
+            let was = self.blocks[which].pieces[row].kind;
+            let mut new = piece(joint, axis, &self.at(which, row, a, b), h, was);
             let piece = &mut self.blocks[which].pieces[row];
             if piece.kind == new.kind && (piece.gamma - new.gamma).abs() <= SAME_SPRING * piece.gamma {
                 // Its goal goes with either.
@@ -364,7 +365,7 @@ impl Work {
             let block = &self.blocks[which];
             let mut off = way / h - block.velocity(a, b);
             for row in 0..3 {
-                if block.pieces[row].kind != kind::LOCKED {
+                if !matches!(block.pieces[row].kind, kind::LOCKED | kind::LOW | kind::HIGH) {
                     off[row] = 0.0;
                 }
             }
@@ -388,8 +389,9 @@ impl Work {
             let drive = &joint.drives[axis];
             off[row] = match self.blocks[which].pieces[row].kind {
                 // Of an axis that is locked by equal limits, those; else zero.
-                kind::LOCKED | kind::LOW => coordinate - drive.low,
-                kind::HIGH => coordinate - drive.high,
+                kind::LOCKED => coordinate - drive.low,
+                kind::LOW => (coordinate - drive.low).min(0.0),
+                kind::HIGH => (coordinate - drive.high).max(0.0),
                 _ => 0.0,
             };
         }
