@@ -42,7 +42,13 @@ fn begin(
 ) {
     let i = invocation(wg, num, lid);
     if i < step.body_count {
-        work_states[i] = states[i];
+        var state = states[i];
+        if (state.flags & BODY_POSED) != 0u {
+            // What is moved by poses stands still until it is given one.
+            state.linear_velocity = vec3<f32>();
+            state.angular_velocity = vec3<f32>();
+        }
+        work_states[i] = state;
         masks[2u * i] = 0u;
         masks[2u * i + 1u] = 0u;
         claims[i] = NO_CLAIM;
@@ -154,6 +160,13 @@ fn apply_to_body(record: EditRecord, state: ptr<function, BodyState>, own_props:
             pull(state, *own_props, a, cross(b - (*state).position, a));
         }
         case EDIT_WAKE: {}
+        case EDIT_NEXT_POSE: {
+            let own = xyzw(record.data[1]);
+            let position = a + rotate(own, (*own_props).center_of_mass);
+            let turn = multiply(unit(multiply(own, (*own_props).frame)), conjugate((*state).rotation));
+            (*state).linear_velocity = (position - (*state).position) / step.dt;
+            (*state).angular_velocity = rotation_vector(turn) / step.dt;
+        }
         default: {
             (*state).flags |= BODY_FROZEN;
             (*state).linear_velocity = vec3<f32>();

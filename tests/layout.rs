@@ -139,7 +139,7 @@ macro_rules! constants {
 
 fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
     constants! {
-        body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN, ASLEEP, STAYS_AWAKE }
+        body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN, ASLEEP, STAYS_AWAKE, POSED }
         solver as "SOLVER_" { ONE_PASS, SOFT, GAUSS_SEIDEL, JACOBI, PENALTY }
         shape_kind as "SHAPE_" { NONE, BALL, CUBOID, HALFSPACE }
         aabb_body as "AABB_" { INDEX, FIXED, DYNAMIC, LIVE, ASLEEP }
@@ -148,7 +148,7 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
         }
         overflow as "OVERFLOW_" { NONE, PAIRS, TURNS, LAST_BATCH, UNBOUNDED, SWEEP }
         edit_op as "EDIT_" {
-            SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, WAKE,
+            SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, WAKE, NEXT_POSE,
             COLLIDER, COLLIDER_REMOVE
         }
         query_word as "QUERY_" { UNBOUNDED, TURNS, TOTAL, COUNT }

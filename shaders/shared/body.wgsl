@@ -9,6 +9,7 @@ const BODY_KIND: u32 = 3u;
 const BODY_FROZEN: u32 = 4u;
 const BODY_ASLEEP: u32 = 8u;
 const BODY_STAYS_AWAKE: u32 = 16u;
+const BODY_POSED: u32 = 32u;
 
 struct BodyState {
     position: vec3<f32>,

@@ -11,6 +11,8 @@ pub enum RigidBodyType {
     Fixed,
     /// The velocity that the user sets, and nothing else.
     KinematicVelocityBased,
+    /// The poses that the user gives it, one a step.
+    KinematicPositionBased,
     /// Forces, impulses and contacts.
     Dynamic,
 }
@@ -91,6 +93,12 @@ impl RigidBodyBuilder {
     /// A body that keeps the velocity it is given and pushes what it meets.
     pub fn kinematic_velocity_based() -> Self {
         Self::new(RigidBodyType::KinematicVelocityBased)
+    }
+    /// A body that goes where [`Editor::set_next_kinematic_pose`](crate::Editor::set_next_kinematic_pose) tells it, within
+    /// the step, and pushes what it meets with the velocity that this takes. It stands still in steps for which nothing was
+    /// told.
+    pub fn kinematic_position_based() -> Self {
+        Self::new(RigidBodyType::KinematicPositionBased)
     }
     /// Origin of the body's frame in the world, m.
     pub fn translation(mut self, translation: Vec3) -> Self {

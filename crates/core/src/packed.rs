@@ -72,13 +72,14 @@ pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<PackedBody> {
         }
     };
     let rotation = builder.rotation.normalize();
+    let still = matches!(builder.body_type, RigidBodyType::Fixed | RigidBodyType::KinematicPositionBased);
     let state = BodyState {
         position: (builder.translation + rotation * mass.center_of_mass).to_array(),
         flags: body_kind(builder.body_type) | if dynamic && !builder.can_sleep { body_flags::STAYS_AWAKE } else { 0 },
         rotation: (rotation * mass.principal_frame).normalize().to_array(),
-        linear_velocity: if builder.body_type == RigidBodyType::Fixed { [0.0; 3] } else { builder.linvel.to_array() },
+        linear_velocity: if still { [0.0; 3] } else { builder.linvel.to_array() },
         generation: body.generation(),
-        angular_velocity: if builder.body_type == RigidBodyType::Fixed { [0.0; 3] } else { builder.angvel.to_array() },
+        angular_velocity: if still { [0.0; 3] } else { builder.angvel.to_array() },
         credit: MOST_CREDIT,
         ..BodyState::zeroed()
     };
@@ -142,6 +143,7 @@ fn body_kind(body_type: RigidBodyType) -> u32 {
     match body_type {
         RigidBodyType::Fixed => body_flags::FIXED,
         RigidBodyType::KinematicVelocityBased => body_flags::KINEMATIC,
+        RigidBodyType::KinematicPositionBased => body_flags::KINEMATIC | body_flags::POSED,
         RigidBodyType::Dynamic => body_flags::DYNAMIC,
     }
 }

@@ -37,6 +37,7 @@ impl RapierWorld {
             let builder = match b.body_type {
                 RigidBodyType::Fixed => r::RigidBodyBuilder::fixed(),
                 RigidBodyType::KinematicVelocityBased => r::RigidBodyBuilder::kinematic_velocity_based(),
+                RigidBodyType::KinematicPositionBased => r::RigidBodyBuilder::kinematic_position_based(),
                 RigidBodyType::Dynamic => r::RigidBodyBuilder::dynamic(),
             };
             let body = world.bodies.insert(

@@ -7,7 +7,7 @@ pub mod body_flags {
     pub const NONE: u32 = 0;
     /// Never moves.
     pub const FIXED: u32 = 1;
-    /// Moves with the velocity that the user sets, pushed by nothing.
+    /// Moves with the velocity that the user sets, or to the poses that the user gives it, pushed by nothing.
     pub const KINEMATIC: u32 = 2;
     /// Moved by forces and contacts.
     pub const DYNAMIC: u32 = 3;
@@ -19,6 +19,8 @@ pub mod body_flags {
     pub const ASLEEP: u32 = 8;
     /// Never to be put to sleep.
     pub const STAYS_AWAKE: u32 = 16;
+    /// Kinematic, and moved by poses: it has no velocity but that of the step in which it is given one.
+    pub const POSED: u32 = 32;
 }
 
 /// What lasts of a body from step to step. 96 bytes. Position is that of the centre of mass; the body frame
