@@ -175,11 +175,15 @@ fn apply_to_body(record: EditRecord, state: ptr<function, BodyState>, own_props:
     }
 }
 
-// Adds an impulse and an angular impulse.
+// Adds an impulse and an angular impulse. (Along locked axes velocities are taken away before they are looked at.)
 fn push(state: ptr<function, BodyState>, own_props: BodyProps, impulse: vec3<f32>, angular: vec3<f32>) {
     let q = (*state).rotation;
     let linear = (*state).linear_velocity + own_props.inverse_mass * impulse;
-    let turn = rotate(q, own_props.inverse_inertia * rotate_back(q, angular));
+    var turn = rotate(q, own_props.inverse_inertia * rotate_back(q, angular));
+    if (own_props.locked & LOCKED_ROTATIONS) != 0u {
+        let locked = three_bits(own_props.locked, LOCKED_FIRST_ROTATION);
+        turn = held_inverse_inertia(q, own_props.inertia, locked) * angular;
+    }
     (*state).linear_velocity = linear;
     (*state).angular_velocity = (*state).angular_velocity + turn;
 }
@@ -212,6 +216,7 @@ fn read_props(record: EditRecord) -> BodyProps {
     read.frame = xyzw(record.data[3]);
     read.angular_damping = bitcast<f32>(record.data[4].x);
     read.reach = bitcast<f32>(record.data[4].y);
+    read.locked = record.data[4].z;
     return read;
 }
 

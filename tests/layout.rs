@@ -73,11 +73,11 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         }
         BodyProps {
             inverse_inertia, inverse_mass, inertia, gravity_scale, center_of_mass, linear_damping, frame,
-            angular_damping, reach, pad_b, pad_c
+            angular_damping, reach, locked, pad_c
         }
         Rest { position, time, rotation, island, pad_a, pad_b, pad_c }
         SolverBody {
-            linear_velocity, inverse_mass, angular_velocity, touched, translation, eigenvalue, delta,
+            linear_velocity, inverse_mass, angular_velocity, marks, translation, eigenvalue, delta,
             inverse_inertia_diagonal, level, inverse_inertia_off, parts, linear_start, weight, angular_start, weighted
         }
         PoseRecord { translation, tag, rotation }
@@ -140,6 +140,8 @@ macro_rules! constants {
 fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
     constants! {
         body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN, ASLEEP, STAYS_AWAKE, POSED }
+        locks as "LOCKED_" { TRANSLATIONS, ROTATIONS, FIRST_ROTATION }
+        marks as "MARK_" { TOUCHED, FIRST_LOCK }
         solver as "SOLVER_" { ONE_PASS, SOFT, GAUSS_SEIDEL, JACOBI, PENALTY }
         shape_kind as "SHAPE_" { NONE, BALL, CUBOID, HALFSPACE }
         aabb_body as "AABB_" { INDEX, FIXED, DYNAMIC, LIVE, ASLEEP }

@@ -91,7 +91,8 @@ fn begin_copies_states_and_clears_counters() {
 /// One step's edits of a scene: every kind, some bodies with several, some with numbers that are none.
 fn edits_of(bodies: usize, seed: u64) -> (PackedScene, EditBatch, Editor) {
     let mut random = Random::new(seed);
-    let (mut editor, packed) = Editor::new(scene_of(bodies)).unwrap();
+    let (mut editor, mut packed) = Editor::new(scene_of(bodies)).unwrap();
+    packed.props.iter_mut().enumerate().step_by(2).for_each(|(i, props)| props.locked = i as u32 / 15 % 64);
     let handles: Vec<_> = editor.scene().bodies().collect();
     for (i, &body) in handles.iter().enumerate() {
         let (a, b, q) = (random.vector(9.0), random.vector(9.0), random.rotation());

@@ -11,6 +11,13 @@ const BODY_ASLEEP: u32 = 8u;
 const BODY_STAYS_AWAKE: u32 = 16u;
 const BODY_POSED: u32 = 32u;
 
+const LOCKED_TRANSLATIONS: u32 = 7u;
+const LOCKED_ROTATIONS: u32 = 56u;
+const LOCKED_FIRST_ROTATION: u32 = 3u;
+
+const MARK_TOUCHED: u32 = 1u;
+const MARK_FIRST_LOCK: u32 = 28u;
+
 struct BodyState {
     position: vec3<f32>,
     flags: u32,
@@ -35,7 +42,7 @@ struct BodyProps {
     frame: vec4<f32>,
     angular_damping: f32,
     reach: f32,
-    pad_b: u32,
+    locked: u32,
     pad_c: u32,
 }
 
@@ -53,7 +60,7 @@ struct SolverBody {
     linear_velocity: vec3<f32>,
     inverse_mass: f32,
     angular_velocity: vec3<f32>,
-    touched: u32,
+    marks: u32,
     translation: vec3<f32>,
     eigenvalue: f32,
     delta: vec4<f32>,
@@ -76,6 +83,21 @@ struct PoseRecord {
 // Whether contacts can push the body.
 fn moves(flags: u32) -> bool {
     return (flags & (BODY_KIND | BODY_FROZEN | BODY_ASLEEP)) == BODY_DYNAMIC;
+}
+
+// Which of three bits are set, `first` being the lowest.
+fn three_bits(word: u32, first: u32) -> vec3<bool> {
+    return (vec3<u32>(word >> first) & vec3<u32>(1u, 2u, 4u)) != vec3<u32>();
+}
+
+// Whether a body of these marks does not move along some axis.
+fn is_locked(marks: u32) -> bool {
+    return (marks >> MARK_FIRST_LOCK) != 0u;
+}
+
+// What is left of a push on a body of these marks where axes are locked.
+fn along_free(marks: u32, push: vec3<f32>) -> vec3<f32> {
+    return select(push, vec3<f32>(), three_bits(marks, MARK_FIRST_LOCK));
 }
 
 // Mass splitting: a part of a body, before any constraint of the last batch worked on it.

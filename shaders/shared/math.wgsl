@@ -66,6 +66,33 @@ fn mat3_from_quat(q: vec4<f32>) -> mat3x3<f32> {
     );
 }
 
+// The inverse of the inertia of a body that is held about the locked axes of the world, from its principal moments: that
+// of the rows and columns that are left, the others zero.
+fn held_inverse_inertia(rotation: vec4<f32>, inertia: vec3<f32>, locked: vec3<bool>) -> mat3x3<f32> {
+    // Over the largest moment, so that no product leaves the range of floats.
+    let largest = max(inertia.x, max(inertia.y, inertia.z));
+    let r = mat3_from_quat(rotation);
+    let x = r[0] * (inertia.x / largest);
+    let y = r[1] * (inertia.y / largest);
+    let z = r[2] * (inertia.z / largest);
+    let free = select(vec3<f32>(1.0), vec3<f32>(), locked);
+    // A locked axis has a moment of its own, and no product with the others.
+    let d = select(x * r[0] + y * r[1] + z * r[2], vec3<f32>(1.0), locked);
+    let o = (x.xxy * r[0].yzz + y.xxy * r[1].yzz + z.xxy * r[2].yzz) * free.xxy * free.yzz;
+    let xx = d.y * d.z - o.z * o.z;
+    let yy = d.x * d.z - o.y * o.y;
+    let zz = d.x * d.y - o.x * o.x;
+    let xy = o.y * o.z - o.x * d.z;
+    let xz = o.x * o.z - o.y * d.y;
+    let yz = o.x * o.y - o.z * d.x;
+    let scale = 1.0 / ((d.x * xx + o.x * xy + o.y * xz) * largest);
+    return mat3x3<f32>(
+        vec3<f32>(xx * free.x, xy, xz) * scale,
+        vec3<f32>(xy, yy * free.y, yz) * scale,
+        vec3<f32>(xz, yz, zz * free.z) * scale,
+    );
+}
+
 // The symmetric matrix with this diagonal (xx yy zz) and these entries off it (xy xz yz), times v.
 fn symmetric_times(diagonal: vec3<f32>, off: vec3<f32>, v: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(

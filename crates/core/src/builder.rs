@@ -38,6 +38,10 @@ pub struct RigidBodyBuilder {
     pub angular_damping: f32,
     /// Whether it may be put to sleep with its island, where the world has [`Params::sleep`](crate::Params::sleep).
     pub can_sleep: bool,
+    /// Along which of the world's axes it may move.
+    pub enabled_translations: [bool; 3],
+    /// About which of the world's axes it may turn.
+    pub enabled_rotations: [bool; 3],
 }
 
 const FINITE: &str = "finite numbers";
@@ -80,6 +84,8 @@ impl RigidBodyBuilder {
             linear_damping: 0.0,
             angular_damping: 0.0,
             can_sleep: true,
+            enabled_translations: [true; 3],
+            enabled_rotations: [true; 3],
         }
     }
     /// A body that never moves.
@@ -139,6 +145,36 @@ impl RigidBodyBuilder {
     pub fn can_sleep(mut self, can_sleep: bool) -> Self {
         self.can_sleep = can_sleep;
         self
+    }
+
+    /// Along which of the world's axes a dynamic body may move; all at first. Along the others nothing moves it, and it has no
+    /// velocity there, whatever it is given: to what pushes it so, it is as heavy as the world.
+    pub fn enabled_translations(mut self, x: bool, y: bool, z: bool) -> Self {
+        self.enabled_translations = [x, y, z];
+        self
+    }
+    /// About which of the world's axes a dynamic body may turn; all at first. What holds the others is a torque without
+    /// work: a box that stands askew and may turn about y alone does so with the inertia that it has about y. (rapier
+    /// takes 1 / (I⁻¹)yy instead.) With an axis locked there is no gyroscopic torque: by itself, a body turns at a
+    /// constant rate.
+    pub fn enabled_rotations(mut self, x: bool, y: bool, z: bool) -> Self {
+        self.enabled_rotations = [x, y, z];
+        self
+    }
+    /// The centre of mass of a dynamic body stays where it is; it can turn. See
+    /// [`enabled_translations`](Self::enabled_translations).
+    pub fn lock_translations(self) -> Self {
+        self.enabled_translations(false, false, false)
+    }
+    /// A dynamic body never turns. See [`enabled_rotations`](Self::enabled_rotations).
+    pub fn lock_rotations(self) -> Self {
+        self.enabled_rotations(false, false, false)
+    }
+
+    /// [`layout::locks`](crate::layout::locks).
+    pub(crate) fn locked(&self) -> u32 {
+        let all = self.enabled_translations.into_iter().chain(self.enabled_rotations);
+        all.enumerate().map(|(bit, enabled)| u32::from(!enabled) << bit).sum()
     }
 
     pub(crate) fn validate(&self, what: &impl Fn() -> String) -> Result<()> {

@@ -123,6 +123,7 @@ pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<PackedBody> {
         frame: mass.principal_frame.to_array(),
         angular_damping: builder.angular_damping,
         reach,
+        locked: builder.locked(),
         ..BodyProps::zeroed()
     };
     Ok(PackedBody { state, props, colliders })

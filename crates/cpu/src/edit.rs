@@ -4,9 +4,13 @@
 //! properties and colliders are absolute, so that a step that is run again finds what it would have found.
 
 use crate::bounds::STATE_LIMIT;
-use crate::math::{finite, quat, rotate, rotate_back, rotation_vector, vec3};
+use crate::math::{
+    finite, free, held_inverse_inertia, quat, rotate, rotate_back, rotation_vector, symmetric_times, vec3,
+};
 use glam::{Quat, Vec3};
-use tumble_core::layout::{BodyProps, BodyState, Collider, EditRange, EditRecord, StepParams, body_flags, edit_op};
+use tumble_core::layout::{
+    BodyProps, BodyState, Collider, EditRange, EditRecord, StepParams, body_flags, edit_op, locks,
+};
 
 /// What edits may change.
 pub struct Targets<'a> {
@@ -103,11 +107,16 @@ fn apply_to_body(record: &EditRecord, step: &StepParams, state: &mut BodyState, 
     }
 }
 
-/// Adds an impulse and an angular impulse.
+/// Adds an impulse and an angular impulse. (Along locked axes velocities are taken away before they are looked at.)
 fn push(state: &mut BodyState, props: &BodyProps, impulse: Vec3, angular: Vec3) {
     let q = quat(state.rotation);
     let linear = vec3(state.linear_velocity) + props.inverse_mass * impulse;
-    let turn = rotate(q, vec3(props.inverse_inertia) * rotate_back(q, angular));
+    let turn = if props.locked & locks::ROTATIONS == 0 {
+        rotate(q, vec3(props.inverse_inertia) * rotate_back(q, angular))
+    } else {
+        let free = free(props.locked, locks::FIRST_ROTATION);
+        symmetric_times(held_inverse_inertia(q, vec3(props.inertia), free), angular)
+    };
     state.linear_velocity = linear.to_array();
     state.angular_velocity = (vec3(state.angular_velocity) + turn).to_array();
 }

@@ -1,8 +1,8 @@
 //! A few words of geometry in the order of operations that the shaders use (`shaders/shared/math.wgsl`).
 
-use glam::{Quat, Vec3};
-use tumble_core::layout::SolverBody;
+use glam::{Mat3, Quat, Vec3};
 pub(crate) use tumble_core::layout::tangents;
+use tumble_core::layout::{SolverBody, marks};
 
 pub(crate) fn vec3(v: [f32; 3]) -> Vec3 {
     Vec3::from_array(v)
@@ -44,9 +44,52 @@ pub(crate) fn rotation_vector(q: Quat) -> Vec3 {
     axis * (16.0 * sixteenth * series)
 }
 
+/// Three bits, `first` being the lowest: 1 where they are not set.
+pub(crate) fn free(word: u32, first: u32) -> Vec3 {
+    let free = |bit: u32| if word >> (first + bit) & 1 == 0 { 1.0 } else { 0.0 };
+    Vec3::new(free(0), free(1), free(2))
+}
+
+/// Whether the body does not move along some axis.
+pub(crate) fn is_locked(body: &SolverBody) -> bool {
+    body.marks >> marks::FIRST_LOCK != 0
+}
+
+/// What is left of a push on the body where axes are locked.
+pub(crate) fn along_free(body: &SolverBody, push: Vec3) -> Vec3 {
+    if is_locked(body) { push * free(body.marks, marks::FIRST_LOCK) } else { push }
+}
+
+/// The inverse of the inertia of a body that is held about the locked axes of the world, from its principal moments: that
+/// of the rows and columns that are left, the others zero. `free` is 0 for those and 1 for the others. Diagonal (xx, yy,
+/// zz) and what is off it (xy, xz, yz).
+pub(crate) fn held_inverse_inertia(rotation: Quat, inertia: Vec3, free: Vec3) -> [Vec3; 2] {
+    // Over the largest moment, so that no product leaves the range of floats.
+    let largest = inertia.max_element();
+    let r = Mat3::from_quat(rotation);
+    let i = inertia / largest;
+    let entry = |row: usize, column: usize| {
+        r.x_axis[row] * i.x * r.x_axis[column]
+            + r.y_axis[row] * i.y * r.y_axis[column]
+            + r.z_axis[row] * i.z * r.z_axis[column]
+    };
+    // A locked axis has a moment of its own, and no product with the others.
+    let own = |axis: usize| if free[axis] > 0.0 { entry(axis, axis) } else { 1.0 };
+    let d = Vec3::new(own(0), own(1), own(2));
+    let products = Vec3::new(entry(0, 1), entry(0, 2), entry(1, 2));
+    let o = products * Vec3::new(free.x, free.x, free.y) * Vec3::new(free.y, free.z, free.z);
+    let diagonal = Vec3::new(d.y * d.z - o.z * o.z, d.x * d.z - o.y * o.y, d.x * d.y - o.x * o.x);
+    let off = Vec3::new(o.y * o.z - o.x * d.z, o.x * o.z - o.y * d.y, o.x * o.y - o.z * d.x);
+    let scale = 1.0 / ((d.x * diagonal.x + o.x * off.x + o.y * off.y) * largest);
+    [diagonal * free * scale, off * scale]
+}
+
 /// The world-space inverse inertia of `body` times `v`.
 pub(crate) fn inverse_inertia_times(body: &SolverBody, v: Vec3) -> Vec3 {
-    let [xx, yy, zz] = body.inverse_inertia_diagonal;
-    let [xy, xz, yz] = body.inverse_inertia_off;
-    Vec3::new(xx * v.x + xy * v.y + xz * v.z, xy * v.x + yy * v.y + yz * v.z, xz * v.x + yz * v.y + zz * v.z)
+    symmetric_times([vec3(body.inverse_inertia_diagonal), vec3(body.inverse_inertia_off)], v)
+}
+
+/// The symmetric matrix with this diagonal (xx, yy, zz) and these entries off it (xy, xz, yz), times `v`.
+pub(crate) fn symmetric_times([d, o]: [Vec3; 2], v: Vec3) -> Vec3 {
+    Vec3::new(d.x * v.x + o.x * v.y + o.y * v.z, o.x * v.x + d.y * v.y + o.z * v.z, o.y * v.x + o.z * v.y + d.z * v.z)
 }

@@ -48,7 +48,13 @@ impl RapierWorld {
                     .gravity_scale(b.gravity_scale)
                     .linear_damping(b.linear_damping)
                     .angular_damping(b.angular_damping)
-                    .can_sleep(false),
+                    .can_sleep(false)
+                    .enabled_translations(
+                        b.enabled_translations[0],
+                        b.enabled_translations[1],
+                        b.enabled_translations[2],
+                    )
+                    .enabled_rotations(b.enabled_rotations[0], b.enabled_rotations[1], b.enabled_rotations[2]),
             );
             for (_, c) in scene.colliders_of(handle).expect("a living body") {
                 let shape = match c.shape {

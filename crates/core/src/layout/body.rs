@@ -23,6 +23,24 @@ pub mod body_flags {
     pub const POSED: u32 = 32;
 }
 
+/// Bits of [`BodyProps::locked`]: the world's axes along and about which a body does not move.
+pub mod locks {
+    /// Bits of translations: x, y, z from the lowest.
+    pub const TRANSLATIONS: u32 = 7;
+    /// Bits of rotations: about x, y, z from the lowest.
+    pub const ROTATIONS: u32 = 56;
+    /// The lowest bit of those is so many bits up.
+    pub const FIRST_ROTATION: u32 = 3;
+}
+
+/// Bits of [`SolverBody::marks`].
+pub mod marks {
+    /// A constraint touches the body in this step.
+    pub const TOUCHED: u32 = 1;
+    /// The [`locks`](super::locks) of translations stand so many bits up: read as floats, each alone is a number.
+    pub const FIRST_LOCK: u32 = 28;
+}
+
 /// What lasts of a body from step to step. 96 bytes. Position is that of the centre of mass; the body frame
 /// is the principal frame of inertia. Written only when a step commits.
 #[repr(C)]
@@ -77,8 +95,8 @@ pub struct BodyProps {
     pub angular_damping: f32,
     /// No point of a collider's surface is farther from the centre of mass, m.
     pub reach: f32,
-    /// Unused.
-    pub pad_b: u32,
+    /// [`locks`], of what can be pushed.
+    pub locked: u32,
     /// Unused.
     pub pad_c: u32,
 }
@@ -110,19 +128,19 @@ pub struct Rest {
 pub struct SolverBody {
     /// m/s.
     pub linear_velocity: [f32; 3],
-    /// 1/kg; zero when nothing may push the body.
+    /// 1/kg; zero when nothing may push the body. Pushes have no effect along locked axes ([`marks`]).
     pub inverse_mass: f32,
     /// rad/s, world frame.
     pub angular_velocity: [f32; 3],
-    /// 1 when a constraint touches the body in this step.
-    pub touched: u32,
+    /// [`marks`].
+    pub marks: u32,
     /// Change of position since the step began, m.
     pub translation: [f32; 3],
     /// [`BodyState::eigenvalue`].
     pub eigenvalue: f32,
     /// Change of rotation since the step began, world frame: rotation = delta * start.
     pub delta: [f32; 4],
-    /// xx, yy, zz of the inverse inertia in the world frame at the start of the step, 1/(kg m²).
+    /// xx, yy, zz of the inverse inertia in the world frame at the start of the step, 1/(kg m²); zero where locked.
     pub inverse_inertia_diagonal: [f32; 3],
     /// Level of sub-steps that it is solved at, see [`StepParams::levels`](super::StepParams::levels).
     pub level: u32,

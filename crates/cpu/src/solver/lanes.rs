@@ -5,7 +5,7 @@ use super::resist::resists;
 use super::simd::{Lanes, V3};
 use super::store::Solved;
 use crate::shared::Shared;
-use tumble_core::layout::{ConstraintHead, Impulse, ManifoldPoint, SolverBody, StepParams};
+use tumble_core::layout::{ConstraintHead, Impulse, ManifoldPoint, SolverBody, StepParams, marks};
 use wide::f32x4;
 
 /// In place of a body where a group has fewer constraints.
@@ -174,9 +174,11 @@ pub(crate) struct Weights<L> {
 pub(crate) struct BodyLanes<L> {
     pub(crate) linear: V3<L>,
     pub(crate) inverse_mass: L,
+    /// Whether any of them has a locked axis.
+    locks: bool,
     pub(crate) angular: V3<L>,
-    /// The field beside the angular velocity, carried along.
-    touched: L,
+    /// The field beside the angular velocity, as it was loaded.
+    marks: L,
     pub(crate) translation: V3<L>,
     pub(crate) eigenvalue: L,
     pub(crate) delta: [L; 4],
@@ -201,6 +203,12 @@ fn columns<L: Lanes>(read: &impl Fn(usize) -> f32x4, index: L::Indices, r: usize
     L::columns(rows)
 }
 
+/// Bodies with any of these `locks` of translations among their marks.
+#[inline(always)]
+fn locked<L: Lanes>(marks: L, locks: u32) -> L {
+    (marks & L::splat(f32::from_bits(locks << marks::FIRST_LOCK))).simd_gt(L::ZERO)
+}
+
 impl<L: Lanes> BodyLanes<L> {
     /// Loads bodies by `read`, which gives element i of the bodies seen as rows; without their change of pose when
     /// `moved` is false.
@@ -208,7 +216,7 @@ impl<L: Lanes> BodyLanes<L> {
     pub(crate) fn gather(read: impl Fn(usize) -> f32x4, index: L::Indices, moved: bool) -> Self {
         let (read, zero) = (&read, [L::ZERO; 4]);
         let [vx, vy, vz, inverse_mass] = columns(read, index, 0);
-        let [wx, wy, wz, touched] = columns(read, index, 1);
+        let [wx, wy, wz, marks] = columns(read, index, 1);
         let [tx, ty, tz, eigenvalue] = if moved { columns(read, index, 2) } else { zero };
         let delta = if moved { columns(read, index, 3) } else { zero };
         let [dx, dy, dz, _] = columns(read, index, 4);
@@ -216,8 +224,9 @@ impl<L: Lanes> BodyLanes<L> {
         Self {
             linear: V3::new(vx, vy, vz),
             inverse_mass,
+            locks: locked::<L>(marks, 7).any(),
             angular: V3::new(wx, wy, wz),
-            touched,
+            marks,
             translation: V3::new(tx, ty, tz),
             eigenvalue,
             delta,
@@ -233,7 +242,7 @@ impl<L: Lanes> BodyLanes<L> {
     #[inline(always)]
     pub(crate) unsafe fn scatter(self, bodies: &Shared<'_, f32x4>, index: L::Indices) {
         let linear = L::rows([self.linear.x, self.linear.y, self.linear.z, self.inverse_mass]);
-        let angular = L::rows([self.angular.x, self.angular.y, self.angular.z, self.touched]);
+        let angular = L::rows([self.angular.x, self.angular.y, self.angular.z, self.marks]);
         for (lane, &body) in index.as_ref().iter().enumerate() {
             if self.inverse_mass.as_array()[lane] > 0.0 {
                 let row = ROWS * body as usize;
@@ -279,7 +288,7 @@ impl<L: Lanes> BodyLanes<L> {
         r: V3<L>,
         push: V3<L>,
     ) {
-        let linear = self.inverse_mass * push;
+        let linear = self.inverse_mass * self.along_free(push);
         let angular = self.inverse_inertia_times(r.cross(push));
         for (lane, &body) in index.as_ref().iter().enumerate() {
             if self.inverse_mass.as_array()[lane] > 0.0 {
@@ -294,6 +303,25 @@ impl<L: Lanes> BodyLanes<L> {
                 }
             }
         }
+    }
+
+    /// What is left of a push where axes are locked.
+    #[inline(always)]
+    pub(crate) fn along_free(&self, push: V3<L>) -> V3<L> {
+        if !self.locks {
+            return push;
+        }
+        let along = |axis: u32, push: L| !locked(self.marks, 1 << axis) & push;
+        V3::new(along(0, push.x), along(1, push.y), along(2, push.z))
+    }
+
+    /// What `of_locked` gives for bodies with a locked axis, here or in `other`; `plain` for the others.
+    #[inline(always)]
+    pub(crate) fn if_locked(&self, other: &Self, plain: L, of_locked: impl FnOnce() -> L) -> L {
+        if !self.locks && !other.locks {
+            return plain;
+        }
+        (locked(self.marks, 7) | locked(other.marks, 7)).bitselect(of_locked(), plain)
     }
 
     #[inline(always)]
