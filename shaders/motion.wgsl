@@ -163,7 +163,7 @@ fn integrate_position(i: u32) {
         return;
     }
     var way = solver_bodies[i].linear_velocity * step.h;
-    if (solver_bodies[i].marks & MARK_TOUCHED) == 0u && kind == BODY_DYNAMIC {
+    if (solver_bodies[i].touched & TOUCHED_ANY) == 0u && kind == BODY_DYNAMIC {
         way -= acceleration(i) * (0.5 * step.h * step.h);
     }
     solver_bodies[i].translation = solver_bodies[i].translation + way;

@@ -77,7 +77,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         }
         Rest { position, time, rotation, island, pad_a, pad_b, pad_c }
         SolverBody {
-            linear_velocity, inverse_mass, angular_velocity, marks, translation, eigenvalue, delta,
+            linear_velocity, inverse_mass, angular_velocity, touched, translation, eigenvalue, delta,
             inverse_inertia_diagonal, level, inverse_inertia_off, parts, linear_start, weight, angular_start, weighted
         }
         PoseRecord { translation, tag, rotation }
@@ -141,7 +141,7 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
     constants! {
         body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN, ASLEEP, STAYS_AWAKE, POSED }
         locks as "LOCKED_" { TRANSLATIONS, ROTATIONS, FIRST_ROTATION }
-        marks as "MARK_" { TOUCHED, FIRST_LOCK }
+        touched as "TOUCHED_" { CONTACT, JOINED, ANY, FIRST_LOCK }
         solver as "SOLVER_" { ONE_PASS, SOFT, GAUSS_SEIDEL, JACOBI, PENALTY }
         shape_kind as "SHAPE_" { NONE, BALL, CUBOID, HALFSPACE }
         aabb_body as "AABB_" { INDEX, FIXED, DYNAMIC, LIVE, ASLEEP }

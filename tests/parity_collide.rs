@@ -27,7 +27,7 @@ use frame::scene_of;
 use random::{Crowd, Random, step_of};
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::*;
-use tumble_core::{ColliderBuilder, Editor, PackedScene, Pose, RigidBodyBuilder};
+use tumble_core::{ColliderBuilder, Editor, JointSolver, PackedScene, Pose, RigidBodyBuilder};
 use tumble_cpu::bounds::{self, FAR, STATE_LIMIT, size_class};
 use tumble_cpu::broadphase::{Boxes, CLASSES};
 use tumble_cpu::edit;
@@ -125,7 +125,7 @@ fn edits_of(bodies: usize, seed: u64) -> (PackedScene, EditBatch, Editor) {
         let shape = if i % 2 == 0 { ColliderBuilder::ball(0.3) } else { ColliderBuilder::cuboid(0.2, 0.3, 0.4) };
         editor.insert(body.linvel(offset), shape.translation(offset)).unwrap();
     }
-    let mut batch = editor.take();
+    let mut batch = editor.take(JointSolver::default());
     for record in batch.records.iter_mut().filter(|r| r.op == edit_op::POSE).skip(1).step_by(5) {
         record.op = edit_op::NEXT_POSE;
     }

@@ -15,8 +15,10 @@ const LOCKED_TRANSLATIONS: u32 = 7u;
 const LOCKED_ROTATIONS: u32 = 56u;
 const LOCKED_FIRST_ROTATION: u32 = 3u;
 
-const MARK_TOUCHED: u32 = 1u;
-const MARK_FIRST_LOCK: u32 = 28u;
+const TOUCHED_CONTACT: u32 = 1u;
+const TOUCHED_JOINED: u32 = 2u;
+const TOUCHED_ANY: u32 = 3u;
+const TOUCHED_FIRST_LOCK: u32 = 28u;
 
 struct BodyState {
     position: vec3<f32>,
@@ -60,7 +62,7 @@ struct SolverBody {
     linear_velocity: vec3<f32>,
     inverse_mass: f32,
     angular_velocity: vec3<f32>,
-    marks: u32,
+    touched: u32,
     translation: vec3<f32>,
     eigenvalue: f32,
     delta: vec4<f32>,
@@ -90,14 +92,14 @@ fn three_bits(word: u32, first: u32) -> vec3<bool> {
     return (vec3<u32>(word >> first) & vec3<u32>(1u, 2u, 4u)) != vec3<u32>();
 }
 
-// Whether a body of these marks does not move along some axis.
-fn is_locked(marks: u32) -> bool {
-    return (marks >> MARK_FIRST_LOCK) != 0u;
+// Whether a body of these flags does not move along some axis.
+fn is_locked(touched: u32) -> bool {
+    return (touched >> TOUCHED_FIRST_LOCK) != 0u;
 }
 
-// What is left of a push on a body of these marks where axes are locked.
-fn along_free(marks: u32, push: vec3<f32>) -> vec3<f32> {
-    return select(push, vec3<f32>(), three_bits(marks, MARK_FIRST_LOCK));
+// What is left of a push on a body of these flags where axes are locked.
+fn along_free(touched: u32, push: vec3<f32>) -> vec3<f32> {
+    return select(push, vec3<f32>(), three_bits(touched, TOUCHED_FIRST_LOCK));
 }
 
 // Mass splitting: a part of a body, before any constraint of the last batch worked on it.

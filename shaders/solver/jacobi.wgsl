@@ -16,8 +16,8 @@ fn part_of(body: SolverBody) -> SolverBody {
 fn yield_of(body: ptr<function, SolverBody>, r: vec3<f32>, normal: vec3<f32>) -> f32 {
     let turn = cross(r, normal);
     var moved = 1.0;
-    if is_locked((*body).marks) {
-        moved = dot(along_free((*body).marks, normal), normal);
+    if is_locked((*body).touched) {
+        moved = dot(along_free((*body).touched, normal), normal);
     }
     return (*body).inverse_mass * moved + dot(turn, inverse_inertia_times(body, turn));
 }

@@ -43,7 +43,7 @@ const NO_RADIUS: f32 = 1e30; // m: more than any
 fn lock(i: u32, body: ptr<function, SolverBody>) {
     let locked = props[i].locked;
     let turns = three_bits(locked, LOCKED_FIRST_ROTATION);
-    (*body).marks |= (locked & LOCKED_TRANSLATIONS) << MARK_FIRST_LOCK;
+    (*body).touched |= (locked & LOCKED_TRANSLATIONS) << TOUCHED_FIRST_LOCK;
     (*body).linear_velocity = select((*body).linear_velocity, vec3<f32>(), three_bits(locked, 0u));
     (*body).angular_velocity = select((*body).angular_velocity, vec3<f32>(), turns);
     if any(turns) {
@@ -58,7 +58,7 @@ fn prepare_body(i: u32) -> SolverBody {
     var body: SolverBody;
     body.linear_velocity = work_states[i].linear_velocity;
     body.angular_velocity = work_states[i].angular_velocity;
-    body.marks = select(0u, MARK_TOUCHED, (masks[2u * i] | masks[2u * i + 1u]) != 0u);
+    body.touched = select(0u, TOUCHED_CONTACT, (masks[2u * i] | masks[2u * i + 1u]) != 0u);
     body.eigenvalue = work_states[i].eigenvalue;
     body.level = level_of(step.levels, work_states[i].credit);
     body.delta = vec4<f32>(0.0, 0.0, 0.0, 1.0);
@@ -127,8 +127,8 @@ fn response(
     let turn_a = cross(inverse_inertia_times(a, cross(ra, u)), ra);
     let turn_b = cross(inverse_inertia_times(b, cross(rb, u)), rb);
     var moved = (a.inverse_mass + b.inverse_mass) * dot(u, v);
-    if is_locked(a.marks | b.marks) {
-        moved = a.inverse_mass * dot(along_free(a.marks, u), v) + b.inverse_mass * dot(along_free(b.marks, u), v);
+    if is_locked(a.touched | b.touched) {
+        moved = a.inverse_mass * dot(along_free(a.touched, u), v) + b.inverse_mass * dot(along_free(b.touched, u), v);
     }
     return moved + dot(v, turn_a + turn_b);
 }

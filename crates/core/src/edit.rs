@@ -6,15 +6,19 @@ use crate::builder::{
 };
 use crate::choice::Spread;
 use crate::error::{Result, check};
-use crate::handle::{BodyHandle, ColliderHandle, Inserted};
+use crate::handle::{BodyHandle, ColliderHandle, Inserted, JointHandle};
+use crate::joint::{JointAxis, JointBuilder, JointMotor};
+use crate::joint_edits::{JointEdits, JointSet};
 use crate::layout::{BodyProps, Collider, EditRange, EditRecord, edit_op};
 use crate::packed::{PackedBody, PackedScene, pack_body};
 use crate::plan::Plan;
 use crate::poses::Pose;
 use crate::scene::Scene;
+use crate::topology::JointSolver;
 use bytemuck::Zeroable;
 use glam::{Quat, Vec3};
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Collects edits for the next step and keeps the description of the scene in step with them.
 #[derive(Debug, Clone)]
@@ -30,6 +34,7 @@ pub struct Editor {
     stale: Stale,
     /// Who was at a collider slot before the edits that no step has taken.
     before: HashMap<u32, Option<(ColliderHandle, BodyHandle)>>,
+    joints: JointEdits,
 }
 
 /// Most impulses and forces on one body in one step: one loop of a shader applies them.
@@ -49,6 +54,8 @@ pub struct Stale {
 pub struct EditBatch {
     /// Which trees they make stale.
     pub stale: Stale,
+    /// The joints that the step has.
+    pub joints: Arc<JointSet>,
     /// Sorted by target, in the order of the calls within one.
     pub records: Vec<EditRecord>,
     /// One for each body or collider that changes.
@@ -68,6 +75,7 @@ impl Editor {
             grown: false,
             stale: Stale::default(),
             before: HashMap::new(),
+            joints: JointEdits::default(),
         };
         Ok((editor, packed))
     }
@@ -143,6 +151,7 @@ impl Editor {
         let handle = self.scene.attach(body, collider)?;
         self.before.entry(handle.slot).or_insert(None);
         self.grown = true;
+        self.joints.changed(self.scene.joints_of(body)?);
         self.touch(body, true);
         self.restore_props(body, &before);
         let PackedBody { props, colliders, .. } = pack_body(&self.scene, body)?;
@@ -156,8 +165,47 @@ impl Editor {
         Ok(handle)
     }
 
-    /// Removes a body with its colliders and contacts.
+    /// Joins two bodies: see [`Scene::insert_joint`].
+    pub fn insert_joint(&mut self, body1: BodyHandle, body2: BodyHandle, joint: JointBuilder) -> Result<JointHandle> {
+        let handle = self.scene.insert_joint(body1, body2, joint)?;
+        self.grown = true;
+        self.change_joint(handle)?;
+        Ok(handle)
+    }
+
+    /// Removes a joint.
+    pub fn remove_joint(&mut self, joint: JointHandle) -> Result<()> {
+        self.change_joint(joint)?;
+        self.scene.remove_joint(joint)
+    }
+
+    /// Describes a joint anew; what it bears stays, and it stays broken if it is.
+    pub fn set_joint(&mut self, joint: JointHandle, builder: JointBuilder) -> Result<()> {
+        self.scene.set_joint(joint, builder)?;
+        self.change_joint(joint)
+    }
+
+    /// Gives an axis of a joint another motor, or none.
+    pub fn set_joint_motor(&mut self, joint: JointHandle, axis: JointAxis, motor: Option<JointMotor>) -> Result<()> {
+        let mut builder = self.scene.joint(joint)?.clone();
+        builder.motors[axis as usize] = motor;
+        self.set_joint(joint, builder)
+    }
+
+    /// Takes down that the joint is another one, and wakes its bodies.
+    fn change_joint(&mut self, joint: JointHandle) -> Result<()> {
+        for body in self.scene.joined(joint)? {
+            self.wake(body)?;
+        }
+        self.joints.changed(&[joint]);
+        Ok(())
+    }
+
+    /// Removes a body with its colliders, contacts and joints.
     pub fn remove(&mut self, body: BodyHandle) -> Result<()> {
+        for joint in self.scene.joints_of(body)?.to_vec() {
+            self.change_joint(joint)?;
+        }
         let handles: Vec<_> = self.scene.colliders_of(body)?.into_iter().map(|(handle, _)| handle).collect();
         handles.iter().for_each(|&handle| _ = self.before.entry(handle.slot).or_insert(Some((handle, body))));
         let colliders: Vec<_> = handles.into_iter().map(ColliderHandle::slot).collect();
@@ -272,7 +320,7 @@ impl Editor {
     }
 
     /// Hands over the edits since the last call, for the step that begins now.
-    pub fn take(&mut self) -> EditBatch {
+    pub fn take(&mut self, joint_solver: JointSolver) -> EditBatch {
         self.pushes.clear();
         self.before.clear();
         if std::mem::take(&mut self.grown) {
@@ -292,7 +340,8 @@ impl Editor {
                 _ => ranges.push(EditRange { first: i as u32, count: 1 }),
             }
         }
-        EditBatch { stale: std::mem::take(&mut self.stale), records, ranges }
+        let joints = self.joints.set(&self.scene, joint_solver);
+        EditBatch { stale: std::mem::take(&mut self.stale), joints, records, ranges }
     }
 
     /// Takes edits back that were handed over for a step that did not run, before those made since.

@@ -1,6 +1,6 @@
 //! What can go wrong, said to the person who reads it: what, where, the value, what is allowed, what to do.
 
-use crate::handle::{BodyHandle, ColliderHandle};
+use crate::handle::{BodyHandle, ColliderHandle, JointHandle};
 
 /// The result of everything here that can fail.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -27,6 +27,9 @@ pub enum Error {
     /// A handle whose collider was removed, or that belongs to another scene.
     #[error("{0} names no living collider: it was removed, or belongs to another scene")]
     StaleCollider(ColliderHandle),
+    /// A handle whose joint was removed, or that belongs to another scene.
+    #[error("{0} names no living joint: it was removed, alone or with one of its bodies, or belongs to another scene")]
+    StaleJoint(JointHandle),
     /// More elements than a buffer holds, and growth is forbidden or impossible.
     #[error(
         "buffer `{buffer}` needs room for {needed} elements and has room for {capacity}; {} (the last good state is \

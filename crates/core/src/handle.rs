@@ -17,6 +17,13 @@ pub struct ColliderHandle {
     pub(crate) generation: u32,
 }
 
+/// Names a joint for as long as it lives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct JointHandle {
+    pub(crate) slot: u32,
+    pub(crate) generation: u32,
+}
+
 /// What [`Scene::insert`](crate::Scene::insert) hands back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Inserted {
@@ -41,6 +48,23 @@ impl ColliderHandle {
     /// The index of the collider in every per-collider array.
     pub fn slot(self) -> usize {
         self.slot as usize
+    }
+}
+
+impl JointHandle {
+    /// The index of the joint in every per-joint array.
+    pub fn slot(self) -> usize {
+        self.slot as usize
+    }
+    /// How often the slot was taken before.
+    pub fn generation(self) -> u32 {
+        self.generation
+    }
+}
+
+impl fmt::Display for JointHandle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "joint {} (generation {})", self.slot, self.generation)
     }
 }
 

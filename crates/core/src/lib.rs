@@ -9,8 +9,12 @@ mod builder;
 mod choice;
 pub mod contacts;
 pub mod edit;
+#[doc(hidden)]
+pub mod elimination;
 mod error;
 mod handle;
+mod joint;
+mod joint_edits;
 pub mod layout;
 pub mod limits;
 mod mass;
@@ -27,6 +31,8 @@ mod shape;
 mod solver;
 #[doc(hidden)]
 pub mod stopwatch;
+#[doc(hidden)]
+pub mod topology;
 pub mod validate;
 pub mod wear;
 
@@ -36,7 +42,9 @@ pub use choice::Spread;
 pub use contacts::{Contact, ContactPoint, Contacts};
 pub use edit::Editor;
 pub use error::{Error, Result};
-pub use handle::{BodyHandle, ColliderHandle, Inserted};
+pub use handle::{BodyHandle, ColliderHandle, Inserted, JointHandle};
+pub use joint::{JointAxis, JointBuilder, JointMotor, JointSoftness, MotorModel};
+pub use joint_edits::JointSet;
 pub use mass::MassProperties;
 pub use packed::PackedScene;
 pub use params::{Batching, Broadphase, Capacities, LastBatch, MortonBits, Params, Sleep, Traversal};
@@ -47,5 +55,6 @@ pub use report::{Penetration, StageRun, StageTime, StepReport};
 pub use scene::Scene;
 pub use shape::Shape;
 pub use solver::{GaussSeidel, Jacobi, OnePass, Penalty, Soft, Solver};
+pub use topology::{JointSolver, Topology};
 
 pub use glam;

@@ -2,8 +2,11 @@
 
 use crate::builder::RigidBodyType;
 use crate::error::Result;
-use crate::handle::BodyHandle;
-use crate::layout::{BodyProps, BodyState, Collider, MOST_CREDIT, body_flags, shape_kind};
+use crate::handle::{BodyHandle, JointHandle};
+use crate::joint::{JointAxis, MotorModel};
+use crate::layout::{
+    BodyProps, BodyState, Collider, Joint, JointDrive, MOST_CREDIT, body_flags, joint_bits, shape_kind,
+};
 use crate::mass::MassProperties;
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -128,6 +131,79 @@ pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<PackedBody> {
     };
     Ok(PackedBody { state, props, colliders })
 }
+
+/// A joint as a backend stores it.
+pub(crate) fn pack_joint(scene: &Scene, handle: JointHandle) -> Result<Joint> {
+    let entry = scene.joint_entry(handle)?;
+    let builder = &entry.builder;
+    // In the principal frames, as everything that the solver sees.
+    let placed = |body: BodyHandle, anchor: Vec3, rotation: Quat| -> Result<([f32; 3], [f32; 4])> {
+        let dynamic = scene.body(body)?.body_type == RigidBodyType::Dynamic;
+        let (center, frame) = match dynamic {
+            true => scene.mass_properties(body).map(|mass| (mass.center_of_mass, mass.principal_frame))?,
+            false => (Vec3::ZERO, Quat::IDENTITY),
+        };
+        let to_principal = frame.inverse();
+        let rotation = (to_principal * rotation.normalize()).normalize();
+        Ok(((to_principal * (anchor - center)).to_array(), rotation.to_array()))
+    };
+    let [body1, body2] = entry.bodies;
+    let (anchor_a, rotation_a) = placed(body1, builder.local_anchor1, builder.local_rotation1)?;
+    let (anchor_b, rotation_b) = placed(body2, builder.local_anchor2, builder.local_rotation2)?;
+    let (mut axes, mut flags) = (0, joint_bits::ALIVE);
+    let mut drives = [JointDrive::zeroed(); 6];
+    for axis in JointAxis::ALL.map(|axis| axis as usize) {
+        let drive = &mut drives[axis];
+        let mut set = |first: u32| axes |= 1 << (first + axis as u32);
+        if builder.locked[axis] {
+            set(joint_bits::LOCKED);
+            continue;
+        }
+        drive.friction = builder.friction[axis];
+        if let Some([low, high]) = builder.limits[axis] {
+            (drive.low, drive.high) = (low, high);
+            set(joint_bits::LIMITED);
+        }
+        if let Some(motor) = builder.motors[axis] {
+            drive.target_pos = motor.target_pos;
+            drive.target_vel = motor.target_vel;
+            drive.stiffness = motor.stiffness;
+            drive.damping = motor.damping;
+            drive.max_force = motor.max_force.min(MOST_FORCE);
+            set(joint_bits::MOTOR);
+            if motor.model == MotorModel::ForceBased {
+                flags |= 1 << (joint_bits::FORCE_BASED + axis as u32);
+            }
+        }
+        if builder.limits[axis].is_some() || builder.motors[axis].is_some() || drive.friction > 0.0 {
+            set(joint_bits::DRIVEN);
+        }
+    }
+    let soft = builder.softness;
+    flags |= if builder.coupled { joint_bits::COUPLED } else { 0 };
+    flags |= if soft.is_some() { joint_bits::SOFT } else { 0 };
+    flags |= if builder.contacts_enabled { 0 } else { joint_bits::APART };
+    Ok(Joint {
+        rotation_a,
+        rotation_b,
+        anchor_a,
+        body_a: body1.slot,
+        anchor_b,
+        body_b: body2.slot,
+        axes,
+        flags,
+        generation: handle.generation,
+        frequency: soft.map_or(0.0, |soft| std::f32::consts::TAU * soft.frequency),
+        damping_ratio: soft.map_or(0.0, |soft| soft.damping_ratio),
+        break_force: builder.break_force.min(MOST_FORCE),
+        break_torque: builder.break_torque.min(MOST_FORCE),
+        pad_a: 0,
+        drives,
+    })
+}
+
+/// In place of an infinite force, N: shaders may assume that floats are finite.
+const MOST_FORCE: f32 = 1e30;
 
 /// How far the collider's surface is from the body's centre of mass at most, m.
 fn reach(collider: &Collider) -> f32 {

@@ -5,6 +5,7 @@ use crate::error::{Result, check};
 use crate::layout::{StepParams, batching};
 use crate::limits::{BYTES_A_PAIR, LAST_LIMIT, batch_rounds};
 use crate::solver::{Law, Solver, Spring};
+use crate::topology::JointSolver;
 use glam::Vec3;
 use std::fmt;
 
@@ -217,6 +218,8 @@ pub struct Params {
     pub static_contacts_last: bool,
     /// How the last batch is solved.
     pub last_batch: LastBatch,
+    /// How joints are solved.
+    pub joints: JointSolver,
     /// Room in buffers.
     pub capacities: Capacities,
     /// Worker threads of the CPU side; `None`: one a core. The result is the same for any number.
@@ -241,6 +244,7 @@ impl Default for Params {
             batching: Batching::default(),
             static_contacts_last: false,
             last_batch: LastBatch::default(),
+            joints: JointSolver::default(),
             capacities: Capacities::default(),
             threads: None,
             profile: false,

@@ -24,6 +24,8 @@ pub struct Plan {
     pub levels: bool,
     /// The last batch is solved by mass splitting.
     pub split: bool,
+    /// Bodies are joined.
+    pub joints: bool,
 }
 
 impl Plan {
@@ -50,7 +52,15 @@ impl Plan {
         allow(balls > 0 && halfspaces > 0, pair_kind::BALL_HALFSPACE);
         allow(cuboids > 0 && halfspaces > 0, pair_kind::CUBOID_HALFSPACE);
         let fixed = if fixed > 0 { fixed.next_power_of_two() } else { 0 };
-        Self { pair_kinds, restitution, fixed, sleep: false, levels: false, split: false }
+        Self {
+            pair_kinds,
+            restitution,
+            fixed,
+            sleep: false,
+            levels: false,
+            split: false,
+            joints: scene.joint_count() > 0,
+        }
     }
 
     /// Adds what `other` needs; true when that was anything new.
@@ -62,6 +72,7 @@ impl Plan {
         self.sleep |= other.sleep;
         self.levels |= other.levels;
         self.split |= other.split;
+        self.joints |= other.joints;
         *self != before
     }
 
@@ -90,10 +101,11 @@ impl fmt::Display for Plan {
         let kinds: Vec<_> = (1..pair_kind::COUNT).filter(|&k| self.has(k)).map(|k| NAMES[k as usize]).collect();
         write!(
             f,
-            "pairs: {}; restitution: {}; fixed: {}; islands: {}",
+            "pairs: {}; restitution: {}; fixed: {}; joints: {}; islands: {}",
             if kinds.is_empty() { "none".into() } else { kinds.join(", ") },
             self.restitution,
             self.fixed,
+            self.joints,
             self.islands()
         )
     }

@@ -2,7 +2,8 @@
 
 use crate::builder::{ColliderBuilder, RigidBodyBuilder, RigidBodyType};
 use crate::error::{Error, Result, check};
-use crate::handle::{BodyHandle, ColliderHandle, Inserted, Slots};
+use crate::handle::{BodyHandle, ColliderHandle, Inserted, JointHandle, Slots};
+use crate::joint::JointBuilder;
 use crate::mass::MassProperties;
 use crate::shape::Shape;
 use glam::Vec3;
@@ -14,6 +15,7 @@ pub(crate) const MAX_COUNT: usize = 1 << 26;
 pub(crate) struct BodyEntry {
     pub(crate) builder: RigidBodyBuilder,
     pub(crate) colliders: Vec<ColliderHandle>,
+    pub(crate) joints: Vec<JointHandle>,
 }
 
 #[derive(Debug, Clone)]
@@ -22,13 +24,20 @@ pub(crate) struct ColliderEntry {
     pub(crate) body: BodyHandle,
 }
 
-/// Bodies with colliders, and gravity. Build it, hand it to a world; later changes go through the world's editor.
+#[derive(Debug, Clone)]
+pub(crate) struct JointEntry {
+    pub(crate) builder: JointBuilder,
+    pub(crate) bodies: [BodyHandle; 2],
+}
+
+/// Bodies with colliders, joints between them, and gravity. Build it, hand it to a world; later changes go through the world's editor.
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// m/s²; (0, -9.81, 0) at first.
     pub gravity: Vec3,
     pub(crate) bodies: Slots<BodyEntry>,
     pub(crate) colliders: Slots<ColliderEntry>,
+    pub(crate) joints: Slots<JointEntry>,
     /// The first thing refused by `insert`; told when a world is made.
     problem: Option<Error>,
 }
@@ -42,7 +51,13 @@ impl Default for Scene {
 impl Scene {
     /// An empty scene with the Earth's gravity along -y.
     pub fn new() -> Self {
-        Self { gravity: Vec3::new(0.0, -9.81, 0.0), bodies: Slots::new(), colliders: Slots::new(), problem: None }
+        Self {
+            gravity: Vec3::new(0.0, -9.81, 0.0),
+            bodies: Slots::new(),
+            colliders: Slots::new(),
+            joints: Slots::new(),
+            problem: None,
+        }
     }
 
     /// Adds a body with its first collider. A bad value is remembered and refused by the world that is made of the
@@ -73,7 +88,7 @@ impl Scene {
     }
 
     fn insert_unchecked(&mut self, builder: RigidBodyBuilder, collider: ColliderBuilder) -> Inserted {
-        let (slot, generation) = self.bodies.insert(BodyEntry { builder, colliders: Vec::new() });
+        let (slot, generation) = self.bodies.insert(BodyEntry { builder, colliders: Vec::new(), joints: Vec::new() });
         let body = BodyHandle { slot, generation };
         Inserted { body, collider: self.attach_unchecked(body, collider) }
     }
@@ -97,9 +112,91 @@ impl Scene {
         Ok(self.attach_unchecked(body, collider))
     }
 
-    /// Removes a body and its colliders.
+    /// Joins two bodies.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] names the value that is not allowed: bodies that are one, or that nothing moves; axes, limits,
+    /// motors. [`Error::StaleBody`] for bodies that are no more.
+    pub fn insert_joint(&mut self, body1: BodyHandle, body2: BodyHandle, joint: JointBuilder) -> Result<JointHandle> {
+        self.check_count("joints", self.joints.len())?;
+        let what = || format!("joint {} between {body1} and {body2}", self.joints.live());
+        let kinds = [self.entry(body1)?.builder.body_type, self.entry(body2)?.builder.body_type];
+        check(body1 != body2, what, "bodies", body1, "two different bodies")?;
+        let any = kinds.contains(&RigidBodyType::Dynamic);
+        check(
+            any,
+            what,
+            "bodies",
+            format!("{kinds:?}"),
+            "at least one dynamic body: nothing else is moved by a joint",
+        )?;
+        joint.validate(&what)?;
+        let (slot, generation) = self.joints.insert(JointEntry { builder: joint, bodies: [body1, body2] });
+        let handle = JointHandle { slot, generation };
+        for body in [body1, body2] {
+            if let Some(entry) = self.bodies.get_mut(body.slot, body.generation) {
+                entry.joints.push(handle);
+            }
+        }
+        Ok(handle)
+    }
+
+    /// Removes a joint.
+    pub fn remove_joint(&mut self, joint: JointHandle) -> Result<()> {
+        let entry = self.joints.remove(joint.slot, joint.generation).ok_or(Error::StaleJoint(joint))?;
+        for body in entry.bodies {
+            if let Some(entry) = self.bodies.get_mut(body.slot, body.generation) {
+                entry.joints.retain(|&other| other != joint);
+            }
+        }
+        Ok(())
+    }
+
+    /// Describes a joint anew.
+    pub fn set_joint(&mut self, joint: JointHandle, builder: JointBuilder) -> Result<()> {
+        self.joint_entry(joint)?;
+        builder.validate(&|| joint.to_string())?;
+        if let Some(entry) = self.joints.get_mut(joint.slot, joint.generation) {
+            entry.builder = builder;
+        }
+        Ok(())
+    }
+
+    /// Number of joints.
+    pub fn joint_count(&self) -> usize {
+        self.joints.live()
+    }
+
+    /// All joints, in slot order.
+    pub fn joints(&self) -> impl Iterator<Item = JointHandle> {
+        self.joints.iter().map(|(slot, generation, _)| JointHandle { slot, generation })
+    }
+
+    /// How the joint was described.
+    pub fn joint(&self, joint: JointHandle) -> Result<&JointBuilder> {
+        self.joint_entry(joint).map(|entry| &entry.builder)
+    }
+
+    /// The bodies that it joins.
+    pub fn joined(&self, joint: JointHandle) -> Result<[BodyHandle; 2]> {
+        self.joint_entry(joint).map(|entry| entry.bodies)
+    }
+
+    /// The body's joints.
+    pub fn joints_of(&self, body: BodyHandle) -> Result<&[JointHandle]> {
+        self.entry(body).map(|entry| entry.joints.as_slice())
+    }
+
+    pub(crate) fn joint_entry(&self, joint: JointHandle) -> Result<&JointEntry> {
+        self.joints.get(joint.slot, joint.generation).ok_or(Error::StaleJoint(joint))
+    }
+
+    /// Removes a body with its colliders and joints.
     pub fn remove(&mut self, body: BodyHandle) -> Result<()> {
         let entry = self.bodies.remove(body.slot, body.generation).ok_or(Error::StaleBody(body))?;
+        for joint in entry.joints {
+            self.remove_joint(joint)?;
+        }
         for collider in entry.colliders {
             self.colliders.remove(collider.slot, collider.generation);
         }

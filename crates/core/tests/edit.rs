@@ -60,7 +60,7 @@ fn records_are_grouped_by_target_in_the_order_of_the_calls() {
     editor.apply_torque_impulse(c.body, Vec3::Z * 3.0).unwrap();
     editor.set_velocity(a.body, Vec3::NEG_Y, Vec3::ZERO).unwrap();
     editor.add_torque(b.body, Vec3::X * 4.0).unwrap();
-    let batch = editor.take();
+    let batch = editor.take(JointSolver::Auto);
     assert_grouped(&batch);
     let (sa, sb, sc) = (a.body.slot() as u32, b.body.slot() as u32, c.body.slot() as u32);
     assert_eq!(
@@ -87,12 +87,12 @@ fn records_are_grouped_by_target_in_the_order_of_the_calls() {
 #[test]
 fn taking_leaves_nothing() {
     let (mut editor, [a, ..]) = editor();
-    assert_eq!(editor.take(), EditBatch::default());
+    assert_eq!(editor.take(JointSolver::Auto), EditBatch::default());
     editor.apply_impulse_at_point(a.body, Vec3::X, Vec3::Y).unwrap();
-    let batch = editor.take();
+    let batch = editor.take(JointSolver::Auto);
     assert_eq!(ops(&batch), [(edit_op::IMPULSE_AT, 0)]);
     assert_eq!((vector(&batch.records[0], 0), vector(&batch.records[0], 1)), (Vec3::X, Vec3::Y));
-    assert_eq!(editor.take(), EditBatch::default());
+    assert_eq!(editor.take(JointSolver::Auto), EditBatch::default());
 }
 
 /// An inserted body's records hold what packing a scene with it gives.
@@ -111,7 +111,7 @@ fn insert_carries_the_packed_body() {
     assert_eq!((new.body.slot(), editor.body_slots(), editor.collider_slots()), (4, 5, 5));
 
     let packed = PackedScene::new(editor.scene()).unwrap();
-    let batch = editor.take();
+    let batch = editor.take(JointSolver::Auto);
     assert!(editor.plan().has(pair_kind::BALL_CUBOID), "the plan is wider now");
     assert_grouped(&batch);
     let expected = [(edit_op::SPAWN, 4), (edit_op::POSE, 4), (edit_op::VELOCITY, 4), (edit_op::COLLIDER, 4)];
@@ -133,7 +133,7 @@ fn a_slot_reused_within_one_step() {
     editor.remove(b.body).unwrap();
     let new = editor.insert(RigidBodyBuilder::fixed(), ColliderBuilder::cuboid(1.0, 1.0, 1.0)).unwrap();
     assert_eq!((new.body.slot(), new.body.generation()), (b.body.slot(), 1));
-    let batch = editor.take();
+    let batch = editor.take(JointSolver::Auto);
     assert_grouped(&batch);
     let expected = [
         (edit_op::IMPULSE, 1),
@@ -158,7 +158,7 @@ fn attach_moves_the_other_colliders() {
     let handle = editor.attach(a.body, ColliderBuilder::ball(0.5).density(1000.0).translation(Vec3::Y)).unwrap();
     assert_eq!((handle.slot(), editor.collider_slots()), (4, 5));
     let packed = PackedScene::new(editor.scene()).unwrap();
-    let batch = editor.take();
+    let batch = editor.take(JointSolver::Auto);
     assert_grouped(&batch);
     let expected = [(edit_op::PROPS, 0), (edit_op::COLLIDER, 0), (edit_op::COLLIDER, 4)];
     assert_eq!(ops(&batch), expected);
@@ -177,7 +177,7 @@ fn attach_moves_the_other_colliders() {
 fn refused_edits_leave_nothing() {
     let (mut editor, [a, b, ..]) = editor();
     editor.remove(b.body).unwrap();
-    editor.take();
+    editor.take(JointSolver::Auto);
     let (nan, far) = (Vec3::splat(f32::NAN), Vec3::splat(1e8));
     let no_turn = Pose { translation: Vec3::ZERO, rotation: Quat::from_array([0.0; 4]) };
     let refused = [
@@ -207,7 +207,7 @@ fn refused_edits_leave_nothing() {
     assert_eq!(editor.remove(b.body), stale);
     assert_eq!(editor.freeze(b.body), stale);
     assert_eq!(editor.attach(b.body, ColliderBuilder::ball(1.0)).map(|_| ()), stale);
-    assert_eq!(editor.take(), EditBatch::default());
+    assert_eq!(editor.take(JointSolver::Auto), EditBatch::default());
     assert_eq!((editor.scene().len(), editor.scene().collider_count()), (3, 3));
     assert_eq!(editor.scene().gravity, Vec3::new(0.0, -9.81, 0.0));
 }
@@ -222,6 +222,6 @@ fn too_many_pushes_on_one_body_are_refused() {
     let error = editor.apply_impulse(a.body, Vec3::X).unwrap_err();
     assert!(error.to_string().contains("impulse is 49001"), "{error}");
     editor.apply_impulse(b.body, Vec3::X).unwrap();
-    editor.take();
+    editor.take(JointSolver::Auto);
     editor.apply_impulse(a.body, Vec3::X).unwrap();
 }

@@ -10,6 +10,7 @@ pub mod contact;
 pub mod continuous;
 pub mod edit;
 pub mod island;
+pub mod joint;
 pub mod level;
 mod math;
 pub mod motion;

@@ -2,7 +2,7 @@
 
 use glam::{Mat3, Quat, Vec3};
 pub(crate) use tumble_core::layout::tangents;
-use tumble_core::layout::{SolverBody, marks};
+use tumble_core::layout::{SolverBody, touched};
 
 pub(crate) fn vec3(v: [f32; 3]) -> Vec3 {
     Vec3::from_array(v)
@@ -52,12 +52,12 @@ pub(crate) fn free(word: u32, first: u32) -> Vec3 {
 
 /// Whether the body does not move along some axis.
 pub(crate) fn is_locked(body: &SolverBody) -> bool {
-    body.marks >> marks::FIRST_LOCK != 0
+    body.touched >> touched::FIRST_LOCK != 0
 }
 
 /// What is left of a push on the body where axes are locked.
 pub(crate) fn along_free(body: &SolverBody, push: Vec3) -> Vec3 {
-    if is_locked(body) { push * free(body.marks, marks::FIRST_LOCK) } else { push }
+    if is_locked(body) { push * free(body.touched, touched::FIRST_LOCK) } else { push }
 }
 
 /// The inverse of the inertia of a body that is held about the locked axes of the world, from its principal moments: that

@@ -4,7 +4,7 @@ use crate::bounds::{STATE_LIMIT, moves};
 use crate::math::{finite, free, quat, rotate, rotate_back, vec3};
 use crate::solver::one_pass::ease;
 use glam::{Quat, Vec3};
-use tumble_core::layout::{BodyProps, BodyState, SolverBody, StepParams, body_flags, locks, marks};
+use tumble_core::layout::{BodyProps, BodyState, SolverBody, StepParams, body_flags, locks, touched};
 
 /// Largest turn of a body in a sub-step, rad; it bounds the number of pieces of a turn.
 pub const MAX_TURN: f32 = 32.0;
@@ -23,10 +23,12 @@ pub fn integrate_velocity(body: &mut SolverBody, state: &BodyState, props: &Body
     if !moves(state.flags) {
         return;
     }
-    let linear = vec3(body.linear_velocity) + acceleration(state, props, step) * step.h;
+    // Of two half kicks the first.
+    let h = if body.touched & touched::JOINED != 0 { 0.5 * step.h } else { step.h };
+    let linear = vec3(body.linear_velocity) + acceleration(state, props, step) * h;
     body.linear_velocity = (linear * (1.0 / (1.0 + step.h * props.linear_damping))).to_array();
     let turn = crate::math::inverse_inertia_times(body, vec3(state.torque));
-    let angular = vec3(body.angular_velocity) + turn * step.h;
+    let angular = vec3(body.angular_velocity) + turn * h;
     body.angular_velocity = (angular * (1.0 / (1.0 + step.h * props.angular_damping))).to_array();
 }
 
@@ -58,6 +60,45 @@ pub fn next_substep(body: &mut SolverBody, state: &BodyState, props: &BodyProps,
     }
 }
 
+/// The second half of gravity and forces, for bodies that joints hold; no load of contacts of this sub-step.
+fn kick_again(body: &mut SolverBody, state: &BodyState, props: &BodyProps, step: &StepParams) {
+    if !moves(state.flags) || body.touched & touched::JOINED == 0 {
+        return;
+    }
+    let linear = acceleration(state, props, step) * (0.5 * step.h);
+    let angular = crate::math::inverse_inertia_times(body, vec3(state.torque)) * (0.5 * step.h);
+    body.linear_velocity = (vec3(body.linear_velocity) + linear).to_array();
+    body.angular_velocity = (vec3(body.angular_velocity) + angular).to_array();
+    body.linear_start = (vec3(body.linear_start) + linear).to_array();
+    body.angular_start = (vec3(body.angular_start) + angular).to_array();
+}
+
+/// With joints: moves the body; what turning adds to its angular velocity is no load of contacts.
+pub fn move_body(body: &mut SolverBody, state: &BodyState, props: &BodyProps, step: &StepParams) {
+    let before = vec3(body.angular_velocity);
+    integrate_position(body, state, props, step);
+    let turned = vec3(body.angular_velocity) - before;
+    body.angular_start = (vec3(body.angular_start) + turned).to_array();
+    kick_again(body, state, props, step);
+}
+
+/// With joints, one pass: moves the body in the last sub-step.
+pub fn move_last(body: &mut SolverBody, state: &BodyState, props: &BodyProps, step: &StepParams) {
+    body.eigenvalue = ease(body, state, props);
+    move_body(body, state, props, step);
+}
+
+/// With joints, one pass: starts the next sub-step, as [`next_substep`].
+pub fn start_next(body: &mut SolverBody, state: &BodyState, props: &BodyProps, step: &StepParams) {
+    let linear = vec3(body.linear_velocity) - vec3(body.linear_start);
+    let angular = vec3(body.angular_velocity) - vec3(body.angular_start);
+    first_substep(body, state, props, step);
+    if body.inverse_mass > 0.0 {
+        body.linear_velocity = (vec3(body.linear_velocity) + linear).to_array();
+        body.angular_velocity = (vec3(body.angular_velocity) + angular).to_array();
+    }
+}
+
 /// One pass: takes down how soft the load on the body is, and moves it.
 pub fn last_substep(body: &mut SolverBody, state: &BodyState, props: &BodyProps, step: &StepParams) {
     body.eigenvalue = ease(body, state, props);
@@ -74,7 +115,7 @@ pub fn integrate_position(body: &mut SolverBody, state: &BodyState, props: &Body
         return;
     }
     let mut way = vec3(body.linear_velocity) * step.h;
-    if body.marks & marks::TOUCHED == 0 && kind == body_flags::DYNAMIC {
+    if body.touched & touched::ANY == 0 && kind == body_flags::DYNAMIC {
         way -= acceleration(state, props, step) * (0.5 * step.h * step.h);
     }
     body.translation = (vec3(body.translation) + way).to_array();

@@ -33,11 +33,16 @@ pub mod locks {
     pub const FIRST_ROTATION: u32 = 3;
 }
 
-/// Bits of [`SolverBody::marks`].
-pub mod marks {
-    /// A constraint touches the body in this step.
-    pub const TOUCHED: u32 = 1;
-    /// The [`locks`](super::locks) of translations stand so many bits up: read as floats, each alone is a number.
+/// Bits of [`SolverBody::touched`].
+pub mod touched {
+    /// A contact, or a joint that is solved by Gauss-Seidel: the body moves by the velocity that these were solved for.
+    pub const CONTACT: u32 = 1;
+    /// Joints that are solved directly: gravity comes in two half kicks.
+    pub const JOINED: u32 = 2;
+    /// Either.
+    pub const ANY: u32 = 3;
+    /// Not what touches it: the [`locks`](super::locks) of translations stand so many bits up. Read as floats, each alone
+    /// is a number.
     pub const FIRST_LOCK: u32 = 28;
 }
 
@@ -128,12 +133,12 @@ pub struct Rest {
 pub struct SolverBody {
     /// m/s.
     pub linear_velocity: [f32; 3],
-    /// 1/kg; zero when nothing may push the body. Pushes have no effect along locked axes ([`marks`]).
+    /// 1/kg; zero when nothing may push the body. Pushes have no effect along locked axes ([`touched`]).
     pub inverse_mass: f32,
     /// rad/s, world frame.
     pub angular_velocity: [f32; 3],
-    /// [`marks`].
-    pub marks: u32,
+    /// What holds the body in this step, see [`touched`].
+    pub touched: u32,
     /// Change of position since the step began, m.
     pub translation: [f32; 3],
     /// [`BodyState::eigenvalue`].

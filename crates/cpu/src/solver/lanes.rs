@@ -5,7 +5,7 @@ use super::resist::resists;
 use super::simd::{Lanes, V3};
 use super::store::Solved;
 use crate::shared::Shared;
-use tumble_core::layout::{ConstraintHead, Impulse, ManifoldPoint, SolverBody, StepParams, marks};
+use tumble_core::layout::{ConstraintHead, Impulse, ManifoldPoint, SolverBody, StepParams, touched};
 use wide::f32x4;
 
 /// In place of a body where a group has fewer constraints.
@@ -178,7 +178,7 @@ pub(crate) struct BodyLanes<L> {
     locks: bool,
     pub(crate) angular: V3<L>,
     /// The field beside the angular velocity, as it was loaded.
-    marks: L,
+    touched: L,
     pub(crate) translation: V3<L>,
     pub(crate) eigenvalue: L,
     pub(crate) delta: [L; 4],
@@ -203,10 +203,10 @@ fn columns<L: Lanes>(read: &impl Fn(usize) -> f32x4, index: L::Indices, r: usize
     L::columns(rows)
 }
 
-/// Bodies with any of these `locks` of translations among their marks.
+/// Bodies of which any of these translations (`locks`) is locked.
 #[inline(always)]
-fn locked<L: Lanes>(marks: L, locks: u32) -> L {
-    (marks & L::splat(f32::from_bits(locks << marks::FIRST_LOCK))).simd_gt(L::ZERO)
+fn locked<L: Lanes>(touched: L, locks: u32) -> L {
+    (touched & L::splat(f32::from_bits(locks << touched::FIRST_LOCK))).simd_gt(L::ZERO)
 }
 
 impl<L: Lanes> BodyLanes<L> {
@@ -216,7 +216,7 @@ impl<L: Lanes> BodyLanes<L> {
     pub(crate) fn gather(read: impl Fn(usize) -> f32x4, index: L::Indices, moved: bool) -> Self {
         let (read, zero) = (&read, [L::ZERO; 4]);
         let [vx, vy, vz, inverse_mass] = columns(read, index, 0);
-        let [wx, wy, wz, marks] = columns(read, index, 1);
+        let [wx, wy, wz, touched] = columns(read, index, 1);
         let [tx, ty, tz, eigenvalue] = if moved { columns(read, index, 2) } else { zero };
         let delta = if moved { columns(read, index, 3) } else { zero };
         let [dx, dy, dz, _] = columns(read, index, 4);
@@ -224,9 +224,9 @@ impl<L: Lanes> BodyLanes<L> {
         Self {
             linear: V3::new(vx, vy, vz),
             inverse_mass,
-            locks: locked::<L>(marks, 7).any(),
+            locks: locked::<L>(touched, 7).any(),
             angular: V3::new(wx, wy, wz),
-            marks,
+            touched,
             translation: V3::new(tx, ty, tz),
             eigenvalue,
             delta,
@@ -242,7 +242,7 @@ impl<L: Lanes> BodyLanes<L> {
     #[inline(always)]
     pub(crate) unsafe fn scatter(self, bodies: &Shared<'_, f32x4>, index: L::Indices) {
         let linear = L::rows([self.linear.x, self.linear.y, self.linear.z, self.inverse_mass]);
-        let angular = L::rows([self.angular.x, self.angular.y, self.angular.z, self.marks]);
+        let angular = L::rows([self.angular.x, self.angular.y, self.angular.z, self.touched]);
         for (lane, &body) in index.as_ref().iter().enumerate() {
             if self.inverse_mass.as_array()[lane] > 0.0 {
                 let row = ROWS * body as usize;
@@ -311,7 +311,7 @@ impl<L: Lanes> BodyLanes<L> {
         if !self.locks {
             return push;
         }
-        let along = |axis: u32, push: L| !locked(self.marks, 1 << axis) & push;
+        let along = |axis: u32, push: L| !locked(self.touched, 1 << axis) & push;
         V3::new(along(0, push.x), along(1, push.y), along(2, push.z))
     }
 
@@ -321,7 +321,7 @@ impl<L: Lanes> BodyLanes<L> {
         if !self.locks && !other.locks {
             return plain;
         }
-        (locked(self.marks, 7) | locked(other.marks, 7)).bitselect(of_locked(), plain)
+        (locked(self.touched, 7) | locked(other.touched, 7)).bitselect(of_locked(), plain)
     }
 
     #[inline(always)]

@@ -43,6 +43,7 @@ pub mod split;
 pub mod store;
 
 use crate::bounds::moves;
+use crate::joint::{self, Part};
 use crate::math::tangents;
 use crate::motion;
 use groups::Groups;
@@ -280,20 +281,28 @@ enum Pass {
     Bodies(BodyPass),
     /// A visit to every constraint.
     Sweep(Visit),
+    /// A part of a sub-step of joints.
+    Joints(joint::Part),
 }
 
 /// What is done to each body.
 type BodyPass = fn(&mut SolverBody, &BodyState, &BodyProps, &StepParams);
 
 /// Runs all sub-steps of the step's level, by the law of `step.solver`.
-pub fn solve(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, restitution: bool) {
-    passes::run(rows, bodies, step, &schedule(step, restitution));
+pub fn solve(
+    rows: &mut Rows,
+    bodies: Bodies<'_>,
+    joints: Option<&joint::Running<'_>>,
+    step: &StepParams,
+    restitution: bool,
+) {
+    passes::run(rows, bodies, joints, step, &schedule(step, restitution, joints.is_some()));
 }
 
 /// The same in plain rows, one constraint after the other: what `solve` is tested against.
 pub fn solve_plain(rows: &mut PlainRows, bodies: Bodies<'_>, step: &StepParams, restitution: bool) {
     let Bodies { solver, states, props } = bodies;
-    for pass in schedule(step, restitution) {
+    for pass in schedule(step, restitution, false) {
         match pass {
             Pass::Bodies(each) => {
                 for (i, body) in solver.iter_mut().enumerate().filter(|(i, body)| takes_part(body, &states[*i], step)) {
@@ -301,6 +310,7 @@ pub fn solve_plain(rows: &mut PlainRows, bodies: Bodies<'_>, step: &StepParams, 
                 }
             }
             Pass::Sweep(visit) => rows.sweep(solver, step, visit),
+            Pass::Joints(_) => unreachable!("a schedule without joints"),
         }
     }
 }
@@ -310,27 +320,48 @@ fn takes_part(body: &SolverBody, state: &BodyState, step: &StepParams) -> bool {
     body.level == step.level || !moves(state.flags)
 }
 
-/// The passes of one level of a step, in order.
-fn schedule(step: &StepParams, restitution: bool) -> Vec<Pass> {
+/// What a step begins with.
+const BEGIN_JOINTS: [Part; 3] = [Part::Begin, Part::BeginLoose, Part::Stiffen];
+/// Before contacts.
+const SOLVE_JOINTS: [Part; 3] = [Part::Solve, Part::WarmStartLoose, Part::SolveLoose];
+/// After bodies have moved.
+const RELAX_JOINTS: [Part; 3] = [Part::Relax, Part::Stiffen, Part::RelaxLoose];
+
+fn joint_passes(joints: bool, parts: &[Part]) -> impl Iterator<Item = Pass> {
+    parts.iter().filter(move |_| joints).map(|&part| Pass::Joints(part))
+}
+
+/// The passes of one level of a step, in order. Joints come before contacts, and once more after bodies have moved.
+fn schedule(step: &StepParams, restitution: bool, joints: bool) -> Vec<Pass> {
     use Pass::{Bodies, Sweep};
     let mut passes = Vec::new();
     if step.levels.trailing_zeros() < step.level {
         passes.push(Bodies(motion::rewind));
     }
+    passes.extend(joint_passes(joints, &BEGIN_JOINTS));
     match step.solver {
         solver::ONE_PASS => {
             passes.extend([Bodies(motion::first_substep), Sweep(Visit::Load)]);
-            for _ in 1..step.substeps {
-                passes.extend([Sweep(Visit::Pass), Bodies(motion::next_substep)]);
+            for substep in 1..=step.substeps {
+                passes.extend(joint_passes(joints, &SOLVE_JOINTS));
+                passes.push(Sweep(Visit::Pass));
+                match (joints, substep < step.substeps) {
+                    (false, true) => passes.push(Bodies(motion::next_substep)),
+                    (false, false) => passes.push(Bodies(motion::last_substep)),
+                    (true, next) => {
+                        passes.push(Bodies(if next { motion::move_body } else { motion::move_last }));
+                        passes.extend(joint_passes(true, &RELAX_JOINTS));
+                        passes.extend(next.then_some(Bodies(motion::start_next)));
+                    }
+                }
             }
-            passes.extend([Sweep(Visit::Pass), Bodies(motion::last_substep)]);
         }
         solver::JACOBI => passes.push(Sweep(Visit::Split)),
         _ => {}
     }
     let others = if step.solver == solver::ONE_PASS { 0 } else { step.substeps };
     for _ in 0..others {
-        passes.extend(substep(step));
+        passes.extend(substep(step, joints));
     }
     if restitution {
         passes.push(Sweep(Visit::Restitution));
@@ -339,35 +370,45 @@ fn schedule(step: &StepParams, restitution: bool) -> Vec<Pass> {
 }
 
 /// A sub-step of the solvers whose sub-steps are all alike.
-fn substep(step: &StepParams) -> Vec<Pass> {
+fn substep(step: &StepParams, joints: bool) -> Vec<Pass> {
     use Pass::{Bodies, Sweep};
     let start = [Bodies(motion::integrate_velocity), Sweep(Visit::WarmStart)];
     let again = step.iterations.saturating_sub(1) as usize;
+    let solve: Vec<_> = joint_passes(joints, &SOLVE_JOINTS).collect();
+    let mut positions = vec![Bodies(if joints { motion::move_body } else { motion::integrate_position })];
+    positions.extend(joint_passes(joints, &RELAX_JOINTS));
     let mut passes = Vec::new();
     match step.solver {
         solver::SOFT => {
             passes.extend(start);
-            passes.extend([Sweep(Visit::Solve), Bodies(motion::integrate_position), Sweep(Visit::Relax)]);
+            passes.extend(solve);
+            passes.push(Sweep(Visit::Solve));
+            passes.extend(positions);
+            passes.push(Sweep(Visit::Relax));
         }
         solver::GAUSS_SEIDEL => {
             passes.extend(start);
+            passes.extend(solve);
             passes.extend(std::iter::repeat_n(Sweep(Visit::GaussSeidel), again));
-            passes.extend([Sweep(Visit::LastGaussSeidel), Bodies(motion::integrate_position)]);
+            passes.push(Sweep(Visit::LastGaussSeidel));
+            passes.extend(positions);
         }
         solver::JACOBI => {
             passes.extend(start);
+            passes.extend(solve);
             passes.push(Bodies(jacobi::begin));
             for _ in 0..again {
                 passes.extend([Sweep(Visit::Jacobi), Bodies(jacobi::settle)]);
             }
-            passes.extend([Sweep(Visit::LastJacobi), Bodies(jacobi::settle), Bodies(motion::integrate_position)]);
+            passes.extend([Sweep(Visit::LastJacobi), Bodies(jacobi::settle)]);
+            passes.extend(positions);
         }
-        _ => passes.extend([
-            Bodies(motion::first_substep),
-            Sweep(Visit::Penalty),
-            Bodies(jacobi::settle),
-            Bodies(motion::integrate_position),
-        ]),
+        _ => {
+            passes.push(Bodies(motion::first_substep));
+            passes.extend(solve);
+            passes.extend([Sweep(Visit::Penalty), Bodies(jacobi::settle)]);
+            passes.extend(positions);
+        }
     }
     passes
 }

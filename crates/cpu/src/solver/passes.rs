@@ -8,6 +8,7 @@ use super::simd::Lanes;
 use super::{
     Bodies, Pass, Rows, Visit, gauss_seidel_lanes, jacobi_lanes, one_pass_lanes, penalty_lanes, soft_lanes, takes_part,
 };
+use crate::joint::Running;
 use crate::shared::Shared;
 use crate::workers::{block_of, blocks, run_stages};
 use std::ops::Range;
@@ -17,6 +18,8 @@ use wide::f32x4;
 
 /// Fewest groups of a block.
 const GROUPS: usize = 8;
+/// Fewest joints of a block.
+const JOINTS: usize = 64;
 /// Fewest bodies of a block.
 const BODIES: usize = 128;
 
@@ -52,43 +55,63 @@ fn parts(rows: &Rows) -> Vec<Part> {
 }
 
 /// Runs the passes.
-pub(super) fn run(rows: &mut Rows, bodies: Bodies<'_>, step: &StepParams, passes: &[Pass]) {
+pub(super) fn run(
+    rows: &mut Rows,
+    bodies: Bodies<'_>,
+    joints: Option<&Running<'_>>,
+    step: &StepParams,
+    passes: &[Pass],
+) {
     let parts = parts(rows);
     let Bodies { solver, states, props } = bodies;
     let all = 0..solver.len();
-    let mut stages: Vec<(Pass, Option<&Part>)> = Vec::new();
+    let mut stages: Vec<(Pass, Option<&Part>, Range<usize>, u32)> = Vec::new();
     for &pass in passes {
         match pass {
-            Pass::Bodies(_) => stages.push((pass, None)),
-            Pass::Sweep(_) => stages.extend(parts.iter().map(|part| (pass, Some(part)))),
+            Pass::Bodies(_) => stages.push((pass, None, all.clone(), blocks(all.len(), BODIES))),
+            Pass::Sweep(_) => stages.extend(parts.iter().map(|p| (pass, Some(p), p.groups.clone(), p.blocks))),
+            Pass::Joints(part) => {
+                let ranges = joints.map_or(Vec::new(), |joints| joints.stages(part));
+                stages.extend(ranges.into_iter().filter(|range| !range.is_empty()).map(|range| {
+                    let least = if part.is_of_islands() { 1 } else { JOINTS };
+                    (pass, None, range.clone(), blocks(range.len(), least))
+                }));
+            }
         }
     }
-    let body_blocks = blocks(all.len(), BODIES);
-    let counts: Vec<u32> = stages.iter().map(|(_, part)| part.map_or(body_blocks, |part| part.blocks)).collect();
+    let counts: Vec<u32> = stages.iter().map(|(.., blocks)| *blocks).collect();
     let groups = rows.groups.shared();
     let last = Mutex::new(&mut rows.last);
     let bodies = Shared::new(solver);
-    run_stages(&counts, |stage, block| match stages[stage] {
-        (Pass::Bodies(each), _) => {
-            for i in block_of(&all, block, body_blocks) {
-                // SAFETY: blocks of a stage share no body.
-                let body = unsafe { &mut bodies.slice_mut(i..i + 1)[0] };
-                if takes_part(body, &states[i], step) {
-                    each(body, &states[i], &props[i], step);
+    run_stages(&counts, |stage, block| {
+        let (pass, part, range, count) = &stages[stage];
+        let range = block_of(range, block, *count);
+        match (pass, part) {
+            (Pass::Bodies(each), _) => {
+                for i in range {
+                    // SAFETY: blocks of a stage share no body.
+                    let body = unsafe { &mut bodies.slice_mut(i..i + 1)[0] };
+                    if takes_part(body, &states[i], step) {
+                        each(body, &states[i], &props[i], step);
+                    }
                 }
             }
-        }
-        (Pass::Sweep(visit), Some(part)) => {
-            let range = block_of(&part.groups, block, part.blocks);
-            // SAFETY: blocks of a stage share no group.
-            unsafe { groups.sweep(range, &bodies.rows(), step, visit) };
-            if part.last {
-                // SAFETY: a part with the last batch has this block alone.
-                let bodies = unsafe { bodies.slice_mut(all.clone()) };
-                last.lock().expect("no other thread had it").sweep(bodies, step, visit);
+            (Pass::Joints(part), _) => {
+                if let Some(joints) = joints {
+                    joints.run(*part, range, &bodies, step);
+                }
             }
+            (Pass::Sweep(visit), Some(part)) => {
+                // SAFETY: blocks of a stage share no group.
+                unsafe { groups.sweep(range, &bodies.rows(), step, *visit) };
+                if part.last {
+                    // SAFETY: a part with the last batch has this block alone.
+                    let bodies = unsafe { bodies.slice_mut(all.clone()) };
+                    last.lock().expect("no other thread had it").sweep(bodies, step, *visit);
+                }
+            }
+            (Pass::Sweep(_), None) => unreachable!("a sweep is over parts"),
         }
-        (Pass::Sweep(_), None) => unreachable!("a sweep is over parts"),
     });
 }
 

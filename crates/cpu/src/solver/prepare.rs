@@ -12,7 +12,7 @@ use bytemuck::Zeroable;
 use glam::{Mat3, Vec3};
 use tumble_core::layout::{
     BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Impulse, Manifold, ManifoldMemory, Pair,
-    SolverBody, StepParams, locks, marks, pair_kind, shape_kind, solver,
+    SolverBody, StepParams, locks, pair_kind, shape_kind, solver, touched,
 };
 
 /// A body as the solver moves it; what nothing may push has no mass and keeps its velocity.
@@ -21,7 +21,7 @@ pub fn prepare_body(state: &BodyState, props: &BodyProps, mask: u64, step: &Step
         linear_velocity: state.linear_velocity,
         inverse_mass: 0.0,
         angular_velocity: state.angular_velocity,
-        marks: if mask != 0 { marks::TOUCHED } else { 0 },
+        touched: if mask != 0 { touched::CONTACT } else { 0 },
         translation: [0.0; 3],
         eigenvalue: state.eigenvalue,
         delta: [0.0, 0.0, 0.0, 1.0],
@@ -55,7 +55,7 @@ pub fn prepare_body(state: &BodyState, props: &BodyProps, mask: u64, step: &Step
 
 /// Neither velocity nor response along and about the locked axes.
 fn lock(body: &mut SolverBody, state: &BodyState, props: &BodyProps) {
-    body.marks |= (props.locked & locks::TRANSLATIONS) << marks::FIRST_LOCK;
+    body.touched |= (props.locked & locks::TRANSLATIONS) << touched::FIRST_LOCK;
     let turns = free(props.locked, locks::FIRST_ROTATION);
     body.linear_velocity = (vec3(body.linear_velocity) * free(props.locked, 0)).to_array();
     body.angular_velocity = (vec3(body.angular_velocity) * turns).to_array();

@@ -4,19 +4,21 @@ use super::asleep::{self, Asleep, Outcome, Waking};
 use crate::batch::{self, Batches, Ends, Ordered};
 use crate::broadphase::{self, Boxes, Finder, Search, TooMany};
 use crate::contact::{self, Matched};
+use crate::joint::{self, Joints};
 use crate::shared::Shared;
 use crate::solver::{self, Rows, prepare, split, store};
 use crate::{bounds, continuous, edit, island, level, motion, narrowphase, sleep};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 use std::borrow::Cow;
+use std::sync::Arc;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{
     Aabb, BodyProps, BodyState, Collider, Control, FoundManifold, Impulse, LAST_BATCH, Manifold, ManifoldMemory, Pair,
     PoseRecord, QUARANTINE_NAMES, SolverBody, StepParams, UNBATCHED, batching, body_flags,
 };
 use tumble_core::stopwatch::Stopwatch;
-use tumble_core::{Broadphase, Error, Params, Result, limits};
+use tumble_core::{Broadphase, Error, JointSet, Params, Result, limits};
 
 /// What lives past a step; written only when a step commits (properties and colliders by edits, absolutely).
 pub(super) struct Kept {
@@ -38,6 +40,7 @@ pub(super) struct Kept {
     /// The solver's rows, kept for their room alone.
     pub(super) rows: Rows,
     pub(super) asleep: Asleep,
+    pub(super) joints: Joints,
 }
 
 /// What the plan phase of a step finds; nothing of it lasts unless the step commits.
@@ -49,6 +52,7 @@ pub(super) struct Planned {
     pub(super) control: Control,
     ends: Vec<Ends>,
     waking: Waking,
+    joints: Arc<JointSet>,
 }
 
 /// What a step is to do, beside its numbers.
@@ -182,7 +186,8 @@ impl Kept {
         if control.last_count > step.last_limit {
             return over("last batch", control.last_count, step.last_limit);
         }
-        Ok(Planned { states, matched, manifolds, batches, control, ends, waking })
+        let joints = edits.joints.clone();
+        Ok(Planned { states, matched, manifolds, batches, control, ends, waking, joints })
     }
 
     /// The working copy of the states with the step's edits applied.
@@ -220,7 +225,8 @@ impl Kept {
     /// Solves and writes everything that lives past the step.
     pub(super) fn commit(&mut self, planned: Planned, step: &StepParams, restitution: bool, watch: &mut Stopwatch) {
         let run = watch.begin("prepare");
-        let Planned { mut states, matched, manifolds, batches, mut control, ends, waking } = planned;
+        let Planned { mut states, matched, manifolds, batches, mut control, ends, waking, joints } = planned;
+        self.joints.reserve(&joints);
         let labels = self.labels(&states, &manifolds, &ends, step);
         control.islands = island::count(&labels);
         if step.tolerance >= 0.0 {
@@ -231,6 +237,7 @@ impl Kept {
             .with_min_len(256)
             .map(|i| prepare::prepare_body(&states[i], &self.props[i], batches.masks[i], step))
             .collect();
+        joint::mark(&joints, &mut bodies);
         if step.batching & batching::SPLIT_LAST != 0 {
             let last = &batches.order[batches.start[LAST_BATCH as usize] as usize..];
             let ends = last.iter().map(|&pair| bodies_of(&matched.pairs[pair as usize], &self.colliders));
@@ -253,7 +260,10 @@ impl Kept {
             });
             run = watch.next(run, "solver");
             let moving = solver::Bodies { solver: &mut bodies, states: &states, props: &self.props };
-            solver::solve(&mut self.rows, moving, &step, restitution);
+            let running =
+                (!joints.topology.joints.is_empty()).then(|| self.joints.running(&joints, &states, &self.props));
+            solver::solve(&mut self.rows, moving, running.as_ref(), &step, restitution);
+            self.joints.store(&joints, &states, &mut bodies, &step);
             self.store(&own.order, &matched, &manifolds);
         }
         let run = watch.next(run, "motion");

@@ -77,6 +77,7 @@ impl World {
             found: Vec::new(),
             rows,
             asleep: Asleep::default(),
+            joints: crate::joint::Joints::default(),
         };
         let (bodies, colliders) = (kept.states.len() as u32, kept.colliders.len() as u32);
         kept.reserve_pairs(limits::initial_pairs(&params.capacities, colliders))?;
@@ -155,7 +156,7 @@ impl World {
         if let Some((_, extent)) = self.extent.take_if(|(seen, _)| *seen + limits::STATUS_DELAY == number) {
             self.editor.look(extent);
         }
-        let edits = self.editor.take();
+        let edits = self.editor.take(self.params.joints);
         let mut step = self.params.step_params(number, self.editor.scene().gravity);
         step.body_count = needed.bodies;
         step.collider_count = needed.colliders;

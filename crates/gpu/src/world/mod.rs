@@ -268,7 +268,7 @@ impl World {
         if let Some((_, extent)) = self.extent.take_if(|(seen, _)| *seen + limits::STATUS_DELAY == self.submitted + 1) {
             self.editor.look(extent);
         }
-        let edits = self.editor.take();
+        let edits = self.editor.take(self.params.joints);
         let mut step = self.params.step_params(self.submitted + 1, self.editor.scene().gravity);
         step.body_count = bodies;
         step.collider_count = colliders;

@@ -1,0 +1,222 @@
+//! Stage `joint`: what holds bodies together. Twin of `shaders/joint/`.
+//!
+//! Joints go first in a sub-step, contacts after them; once bodies have moved, poses are projected onto the joints and
+//! velocities solved anew with the arms as they are then, which keeps a pendulum's energy. Gravity comes in two half
+//! kicks, before and after. Islands of joints are solved directly where that pays (`island`), larger ones by
+//! Gauss-Seidel, batch by batch (`batches`); both with the geometric stiffness of joints as inertia.
+
+pub mod batches;
+pub mod drive;
+pub mod frame;
+pub mod island;
+pub mod rows;
+
+use crate::math::{finite, vec3};
+use crate::shared::Shared;
+use bytemuck::Zeroable;
+use batches::Loose;
+use island::{Island, Scene, Store};
+use rows::Body;
+use std::ops::Range;
+use std::sync::Mutex;
+use tumble_core::JointSet;
+use tumble_core::layout::{BodyProps, BodyState, JointState, SolverBody, StepParams, touched};
+
+/// A part of a sub-step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Once a step, before its sub-steps: islands.
+    Begin,
+    /// Before contacts: islands.
+    Solve,
+    /// After bodies have moved: islands.
+    Relax,
+    /// Once a step: the joints of batches.
+    BeginLoose,
+    /// The inertia of the bodies of batches.
+    Stiffen,
+    /// Batches: impulses of the last sub-step.
+    WarmStartLoose,
+    /// Batches: before contacts.
+    SolveLoose,
+    /// Batches: after bodies have moved.
+    RelaxLoose,
+}
+
+impl Part {
+    /// Whether it is about islands that are solved directly.
+    pub fn is_of_islands(self) -> bool {
+        matches!(self, Self::Begin | Self::Solve | Self::Relax)
+    }
+}
+
+/// The joints of a world.
+#[derive(Debug, Default)]
+pub struct Joints {
+    /// What lasts of each joint, by slot.
+    pub states: Vec<JointState>,
+    islands: Vec<Mutex<Island>>,
+    /// Joints of batches, by their place behind those of islands.
+    loose: Vec<Loose>,
+    /// What lasts of those, in the same order.
+    loose_states: Vec<JointState>,
+}
+
+/// Joints in a step: what all threads see.
+pub struct Running<'a> {
+    scene: Scene<'a>,
+    states: &'a [JointState],
+    islands: &'a [Mutex<Island>],
+    loose: Shared<'a, Loose>,
+    loose_states: Shared<'a, JointState>,
+}
+
+impl Store for Shared<'_, SolverBody> {
+    fn get(&self, slot: usize) -> SolverBody {
+        // SAFETY: islands share no body that moves, and others are not written.
+        unsafe { Shared::get(self, slot) }
+    }
+
+    fn set(&self, slot: usize, body: SolverBody) {
+        // SAFETY: as above.
+        unsafe { Shared::set(self, slot, body) };
+    }
+}
+
+impl Joints {
+    /// Room for the joints of a step.
+    pub fn reserve(&mut self, set: &JointSet) {
+        let topology = &set.topology;
+        self.states.resize(set.joints.len(), JointState::zeroed());
+        self.islands.resize_with(topology.islands.len(), Mutex::default);
+        let loose = (topology.joint_count() - topology.direct_joints()) as usize;
+        self.loose.resize(loose, Loose::default());
+        self.loose_states.resize(loose, JointState::zeroed());
+    }
+
+    /// The passes of a step over these joints.
+    pub(crate) fn running<'a>(&'a mut self, set: &'a JointSet, states: &'a [BodyState], props: &'a [BodyProps]) -> Running<'a> {
+        Running {
+            scene: Scene { set, states, props },
+            states: &self.states,
+            islands: &self.islands,
+            loose: Shared::new(&mut self.loose),
+            loose_states: Shared::new(&mut self.loose_states),
+        }
+    }
+
+    /// Takes down what a level of sub-steps left of its joints.
+    pub(crate) fn store(&mut self, set: &JointSet, states: &[BodyState], bodies: &mut [SolverBody], step: &StepParams) {
+        let first = set.topology.direct_joints() as usize;
+        let store = Shared::new(bodies);
+        for (place, (loose, state)) in self.loose.iter().zip(&self.loose_states).enumerate() {
+            if batches::level(loose, &store) == step.level {
+                let slot = set.topology.joints[first + place];
+                let scene = Scene { set, states, props: &[] };
+                self.states[slot as usize] = kept(loose.lasting(&scene, slot, *state, &store, step));
+            }
+        }
+        for (info, island) in set.topology.islands.iter().zip(&mut self.islands) {
+            if bodies[set.topology.bodies[info.first_body as usize].body as usize].level != step.level {
+                continue;
+            }
+            let island = island.get_mut().expect("no thread panicked with it");
+            let slots = &set.topology.joints[info.first_joint as usize..][..info.joint_count as usize];
+            for (&slot, state) in slots.iter().zip(island.states(set, step)) {
+                self.states[slot as usize] = kept(state);
+            }
+        }
+    }
+}
+
+/// What is kept of a joint: nothing if it is not finite.
+fn kept(state: JointState) -> JointState {
+    if finite(state.impulse) && finite(state.torque) { state } else { JointState::zeroed() }
+}
+
+impl Running<'_> {
+    /// The stages of a part of a sub-step: each a range of islands, bodies or joints that threads may share.
+    pub fn stages(&self, part: Part) -> Vec<Range<usize>> {
+        let topology = &self.scene.set.topology;
+        let first = topology.direct_joints() as usize;
+        let batches = topology.batches.windows(2).map(|b| b[0] as usize - first..b[1] as usize - first);
+        match part {
+            Part::Begin | Part::Solve | Part::Relax => vec![0..topology.islands.len()],
+            Part::BeginLoose => vec![0..topology.joints.len() - first],
+            Part::Stiffen => vec![topology.direct_bodies() as usize..topology.bodies.len()],
+            Part::WarmStartLoose | Part::SolveLoose | Part::RelaxLoose => batches.collect(),
+        }
+    }
+
+    /// Some of a stage's islands, bodies or joints. Those of a stage share nothing that is written.
+    pub(crate) fn run(&self, part: Part, range: Range<usize>, bodies: &Shared<'_, SolverBody>, step: &StepParams) {
+        match part {
+            Part::Begin | Part::Solve | Part::Relax => range.for_each(|index| self.run_island(part, index, bodies, step)),
+            Part::Stiffen => range.for_each(|index| self.stiffen(index, bodies, step)),
+            _ => {
+                // SAFETY: a joint is in one block of one stage.
+                let (loose, states) = unsafe { (self.loose.slice_mut(range.clone()), self.loose_states.slice_mut(range.clone())) };
+                let first = self.scene.set.topology.direct_joints() as usize + range.start;
+                for (index, (loose, state)) in loose.iter_mut().zip(states).enumerate() {
+                    let slot = self.scene.set.topology.joints[first + index];
+                    if part == Part::BeginLoose {
+                        let state_of = self.states[slot as usize];
+                        (*loose, *state) = Loose::begin(&self.scene, slot, state_of, bodies, step);
+                    } else if batches::level(loose, bodies) == step.level {
+                        self.visit(part, slot, loose, state, bodies, step);
+                    }
+                }
+            }
+        }
+    }
+
+    fn visit(&self, part: Part, slot: u32, loose: &mut Loose, state: &mut JointState, bodies: &Shared<'_, SolverBody>, step: &StepParams) {
+        let slots = loose.bodies.map(|slot| slot as usize);
+        let before = slots.map(|slot| Store::get(bodies, slot));
+        let [mut a, mut b] = [0, 1].map(|end| Body::of(&before[end], &self.scene.states[slots[end]]));
+        match part {
+            Part::WarmStartLoose => loose.warm_start(&mut a, &mut b),
+            Part::SolveLoose => loose.solve(&mut a, &mut b),
+            _ => loose.relax(&self.scene, state, slot, &mut a, &mut b, step),
+        }
+        for ((slot, before), body) in slots.into_iter().zip(before).zip([a, b]) {
+            if before.inverse_mass > 0.0 {
+                Store::set(bodies, slot, body.put_velocities(before));
+            }
+        }
+    }
+
+    fn stiffen(&self, index: usize, bodies: &Shared<'_, SolverBody>, step: &StepParams) {
+        let info = &self.scene.set.topology.bodies[index];
+        let first = self.scene.set.topology.direct_joints();
+        let mut body = Store::get(bodies, info.body as usize);
+        // SAFETY: no joint is written in this stage.
+        let impulse = |place: u32| vec3(unsafe { self.loose_states.get((place - first) as usize) }.impulse);
+        if body.level == step.level {
+            batches::stiffen(&self.scene, info, impulse, &mut body, step);
+            Store::set(bodies, info.body as usize, body);
+        }
+    }
+
+    fn run_island(&self, part: Part, index: usize, bodies: &Shared<'_, SolverBody>, step: &StepParams) {
+        let info = &self.scene.set.topology.islands[index];
+        let first = self.scene.set.topology.bodies[info.first_body as usize].body;
+        if Store::get(bodies, first as usize).level != step.level {
+            return;
+        }
+        let mut island = self.islands[index].lock().expect("no thread panicked with it");
+        match part {
+            Part::Begin => island.begin(&self.scene, info, self.states, bodies, step),
+            Part::Solve => island.solve(&self.scene, bodies, step),
+            _ => island.relax(&self.scene, bodies, step),
+        }
+    }
+}
+
+/// Marks the bodies that joints move: see [`SolverBody::touched`].
+pub fn mark(set: &JointSet, bodies: &mut [SolverBody]) {
+    for body in &set.topology.bodies {
+        let bit = if body.direct != 0 { touched::JOINED } else { touched::CONTACT };
+        bodies[body.body as usize].touched |= bit;
+    }
+}

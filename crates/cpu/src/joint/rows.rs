@@ -1,0 +1,393 @@
+//! The rows of joints: what impulses they exchange with their bodies. Twin of `shaders/joint/rows.wgsl`.
+//!
+//! Each joint has up to two blocks of three rows, along its axes and about them. A row that does nothing at the moment
+//! is zero. For locked rows the separation is predicted: it must be gone after the sub-step, and what is linear in the
+//! velocities is off by the remainder d, which is taken in where it is small or smooth.
+
+use super::drive::{AxisState, Piece, kind, piece};
+use super::frame::{Frame, Pose, frame};
+use crate::math::{quat, rotate, vec3};
+use bytemuck::Zeroable;
+use glam::{Mat3, Quat, Vec3};
+use tumble_core::layout::{BodyProps, BodyState, Joint, JointState, SolverBody, StepParams, joint_bits};
+
+/// A body as joints see it.
+#[derive(Debug, Clone, Copy)]
+pub struct Body {
+    /// m/s.
+    pub linear: Vec3,
+    /// rad/s.
+    pub angular: Vec3,
+    /// 1/kg.
+    pub inverse_mass: f32,
+    /// 1/(kg m²), in the world, geometric stiffness included.
+    pub inverse_inertia: Mat3,
+    /// Where it is.
+    pub pose: Pose,
+}
+
+impl Body {
+    /// As the solver has it.
+    pub fn of(body: &SolverBody, state: &BodyState) -> Self {
+        let [xx, yy, zz] = body.inverse_inertia_diagonal;
+        let [xy, xz, yz] = body.inverse_inertia_off;
+        Self {
+            linear: vec3(body.linear_velocity),
+            angular: vec3(body.angular_velocity),
+            inverse_mass: body.inverse_mass,
+            inverse_inertia: Mat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]),
+            pose: Pose {
+                translation: vec3(body.translation),
+                rotation: (quat(body.delta) * quat(state.rotation)).normalize(),
+            },
+        }
+    }
+
+    /// The solver's body with these velocities; what joints add to them is no load of contacts.
+    pub fn put_velocities(&self, mut body: SolverBody) -> SolverBody {
+        let (linear, angular) = (vec3(body.linear_velocity), vec3(body.angular_velocity));
+        body.linear_start = (vec3(body.linear_start) + (self.linear - linear)).to_array();
+        body.angular_start = (vec3(body.angular_start) + (self.angular - angular)).to_array();
+        body.linear_velocity = self.linear.to_array();
+        body.angular_velocity = self.angular.to_array();
+        body
+    }
+
+    /// Where it is after h, as far as its velocities tell.
+    fn predicted(&self, h: f32) -> Pose {
+        let half = 0.5 * h * self.angular;
+        let turn = Quat::from_xyzw(half.x, half.y, half.z, 1.0).normalize();
+        // A turn by the tangent of half the angle is too short by a twelfth of the cube; this is the next order.
+        let square = half.dot(half);
+        let half = half * (1.0 + square / 3.0);
+        let turn = if square < 1.0 { Quat::from_xyzw(half.x, half.y, half.z, 1.0).normalize() } else { turn };
+        Pose { translation: self.pose.translation + h * self.linear, rotation: (turn * self.pose.rotation).normalize() }
+    }
+}
+
+/// Up to three rows.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Block {
+    /// Directions of the impulses along; zero for rows about, and for those not active.
+    pub along: Mat3,
+    /// What they turn the first body by: arms times axes, or axes about.
+    pub turn_a: Mat3,
+    /// The same of the second body.
+    pub turn_b: Mat3,
+    /// Change of the first body's angular velocity by a unit impulse.
+    pub response_a: Mat3,
+    /// The same of the second body.
+    pub response_b: Mat3,
+    /// Impulses of this sub-step, N s or N m s.
+    pub impulse: Vec3,
+    /// Change of the rows' own velocities by a unit impulse, where all rows would be active.
+    pub own: Vec3,
+    /// Pieces of the three rows.
+    pub pieces: [Piece; 3],
+}
+
+impl Default for Piece {
+    fn default() -> Self {
+        Self { kind: kind::FIXED, gamma: 0.0, goal: 0.0, off: 0.0 }
+    }
+}
+
+/// A joint in a step.
+#[derive(Debug, Clone, Copy)]
+pub struct Work {
+    /// Its slot.
+    pub slot: u32,
+    /// Its axes, see [`joint_bits`]; none once it is broken.
+    pub axes: u32,
+    /// What lasts of it.
+    pub state: JointState,
+    /// From the first centre of mass to the second one when the step began, m.
+    pub between: Vec3,
+    /// Its axes and coordinates now.
+    pub frame: Frame,
+    /// Rows along and about.
+    pub blocks: [Block; 2],
+}
+
+impl Block {
+    /// Velocities of the rows.
+    pub fn velocity(&self, a: &Body, b: &Body) -> Vec3 {
+        self.along.transpose() * (b.linear - a.linear)
+            + (self.turn_b.transpose() * b.angular - self.turn_a.transpose() * a.angular)
+    }
+
+    /// Gives the bodies an impulse of the rows.
+    pub fn push(&self, impulse: Vec3, a: &mut Body, b: &mut Body) {
+        let along = self.along * impulse;
+        a.linear -= a.inverse_mass * along;
+        a.angular -= self.response_a * impulse;
+        b.linear += b.inverse_mass * along;
+        b.angular += self.response_b * impulse;
+    }
+
+    /// The block on the diagonal of the system; rows that are not active have a one.
+    pub fn diagonal(&self, a: &Body, b: &Body, regularization: f32) -> Mat3 {
+        let mut k = self.along.transpose() * self.along * (a.inverse_mass + b.inverse_mass)
+            + self.turn_a.transpose() * self.response_a
+            + self.turn_b.transpose() * self.response_b;
+        let more = regularization / 3.0 * (k.x_axis.x + k.y_axis.y + k.z_axis.z);
+        for row in 0..3 {
+            let piece = &self.pieces[row];
+            k.col_mut(row)[row] += if piece.kind == kind::FIXED { 1.0 } else { piece.gamma + more };
+        }
+        k
+    }
+}
+
+impl Work {
+    /// A joint at the beginning of a step with sub-steps of length `h`.
+    pub fn new(slot: u32, joint: &Joint, state: JointState, between: Vec3, h: f32) -> Self {
+        let fresh = JointState { tag: joint.generation + 1, h, ..JointState::zeroed() };
+        let mut state = if state.tag == fresh.tag { state } else { fresh };
+        let scale = if state.h == h || state.h == 0.0 { 1.0 } else { h / state.h };
+        state.impulse = state.impulse.map(|x| scale * x);
+        state.torque = state.torque.map(|x| scale * x);
+        state.h = h;
+        let axes = if state.broken != 0 { 0 } else { joint.axes };
+        let still = Pose { translation: Vec3::ZERO, rotation: Quat::IDENTITY };
+        let blocks = [Block::default(); 2];
+        Self { slot, axes, state, between, frame: frame(joint, &still, &still, between), blocks }
+    }
+
+    /// The impulses of the last sub-step, in the axes as they are now.
+    pub fn carry_impulses(&mut self) {
+        self.blocks[0].impulse = self.frame.along.transpose() * vec3(self.state.impulse);
+        self.blocks[1].impulse = self.frame.about.transpose() * vec3(self.state.torque);
+    }
+
+    /// Begins a sub-step without impulses.
+    pub fn forget_impulses(&mut self) {
+        self.blocks.iter_mut().for_each(|block| block.impulse = Vec3::ZERO);
+    }
+
+    /// Takes the coordinates from the poses; axes and rows stay those of the factor.
+    pub fn look(&mut self, joint: &Joint, a: &Body, b: &Body) {
+        let now = frame(joint, &a.pose, &b.pose, self.between);
+        (self.frame.shift, self.frame.turn) = (now.shift, now.turn);
+    }
+
+    /// Takes axes, coordinates and rows from the poses; pieces stay as they were.
+    pub fn refresh(&mut self, joint: &Joint, a: &Body, b: &Body) {
+        self.frame = frame(joint, &a.pose, &b.pose, self.between);
+        self.rebuild(a, b);
+    }
+
+    /// The rows that are active, from the axes.
+    pub fn rebuild(&mut self, a: &Body, b: &Body) {
+        let Frame { arm_a, arm_b, along, about, .. } = self.frame;
+        let masses = a.inverse_mass + b.inverse_mass;
+        for (which, block) in self.blocks.iter_mut().enumerate() {
+            let rows =
+                self.axes >> (3 * which) & 7 | self.axes >> (joint_bits::DRIVEN + 3 * which as u32) & 7;
+            for row in 0..3 {
+                let axis = if rows >> row & 1 == 0 {
+                    Vec3::ZERO
+                } else if which == 0 {
+                    along.col(row)
+                } else {
+                    about.col(row)
+                };
+                let (turn_a, turn_b) = if which == 0 { (arm_a.cross(axis), arm_b.cross(axis)) } else { (axis, axis) };
+                let (response_a, response_b) = (a.inverse_inertia * turn_a, b.inverse_inertia * turn_b);
+                let push = if which == 0 { axis } else { Vec3::ZERO };
+                block.own[row] = push.dot(push) * masses + turn_a.dot(response_a) + turn_b.dot(response_b);
+                let active = block.pieces[row].kind != kind::FIXED;
+                let set = |m: &mut Mat3, v: Vec3| *m.col_mut(row) = if active { v } else { Vec3::ZERO };
+                set(&mut block.along, push);
+                set(&mut block.turn_a, turn_a);
+                set(&mut block.turn_b, turn_b);
+                set(&mut block.response_a, response_a);
+                set(&mut block.response_b, response_b);
+            }
+        }
+    }
+
+    /// Chooses the pieces of all rows for the velocities and impulses as they are. Whether the system is another one by it.
+    pub fn choose(&mut self, joint: &Joint, a: &Body, b: &Body, h: f32) -> bool {
+        let mut changed = false;
+        for axis in 0..6 {
+            if (self.axes | self.axes >> joint_bits::DRIVEN) >> axis & 1 == 0 {
+                continue;
+            }
+            let (which, row) = (axis / 3, axis % 3);
+            let mut new = piece(joint, axis, &self.at(which, row, a, b), h);
+            let piece = &mut self.blocks[which].pieces[row];
+            if piece.kind == new.kind && (piece.gamma - new.gamma).abs() <= SAME_SPRING * piece.gamma {
+                // Its goal goes with either.
+                new.gamma = piece.gamma;
+            }
+            changed |= piece.kind != new.kind || piece.gamma != new.gamma;
+            *piece = new;
+        }
+        changed
+    }
+
+    /// Gives the bodies what rows of a fixed impulse are to have given.
+    pub fn push_fixed(&mut self, a: &mut Body, b: &mut Body) {
+        let Frame { arm_a, arm_b, along, about, .. } = self.frame;
+        for axis in 0..6 {
+            let (which, row) = (axis / 3, axis % 3);
+            let block = &mut self.blocks[which];
+            let more = block.pieces[row].goal - block.impulse[row];
+            if block.pieces[row].kind != kind::FIXED || more == 0.0 {
+                continue;
+            }
+            block.impulse[row] = block.pieces[row].goal;
+            let (push, turn_a, turn_b) = if which == 0 {
+                let axis = more * along.col(row);
+                (axis, arm_a.cross(axis), arm_b.cross(axis))
+            } else {
+                (Vec3::ZERO, more * about.col(row), more * about.col(row))
+            };
+            a.linear -= a.inverse_mass * push;
+            a.angular -= a.inverse_inertia * turn_a;
+            b.linear += b.inverse_mass * push;
+            b.angular += b.inverse_inertia * turn_b;
+        }
+    }
+
+    /// Where an axis is.
+    fn at(&self, which: usize, row: usize, a: &Body, b: &Body) -> AxisState {
+        let Frame { arm_a, arm_b, along, about, shift, turn } = &self.frame;
+        let block = &self.blocks[which];
+        let velocity = if which == 0 {
+            let velocity = b.linear + b.angular.cross(*arm_b) - a.linear - a.angular.cross(*arm_a);
+            along.col(row).dot(velocity)
+        } else {
+            about.col(row).dot(b.angular - a.angular)
+        };
+        let coordinate = if which == 0 { shift[row] } else { turn[row] };
+        AxisState { coordinate, velocity, impulse: block.impulse[row], response: block.own[row] }
+    }
+
+    /// What the rows of a block still lack of their goals with the velocities as they are. `relax`: hard rows are to stand
+    /// still.
+    pub fn lack(&self, which: usize, a: &Body, b: &Body, relax: bool) -> Vec3 {
+        let block = &self.blocks[which];
+        let velocity = block.velocity(a, b);
+        let mut lack = Vec3::ZERO;
+        for row in 0..3 {
+            let piece = &block.pieces[row];
+            let goal = if relax && piece.kind != kind::SOFT { 0.0 } else { piece.goal };
+            if piece.kind != kind::FIXED {
+                lack[row] = goal - velocity[row] - piece.gamma * block.impulse[row];
+            }
+        }
+        lack
+    }
+
+    /// By how much the separation of the locked rows will be off what is linear, as far as it is to be believed: spins
+    /// make it wrong, unless it is as it was in the last sub-step.
+    pub fn remainders(&mut self, joint: &Joint, a: &Body, b: &Body, h: f32) -> [Vec3; 2] {
+        let next = frame(joint, &a.predicted(h), &b.predicted(h), self.between);
+        let now = self.frame;
+        let spin = h * a.angular.length().max(b.angular.length()) / THETA;
+        let still = 1.0 / (1.0 + spin * spin * spin * spin);
+        let mut remainders = [Vec3::ZERO; 2];
+        for which in 0..2 {
+            let way = if which == 0 { next.shift - now.shift } else { next.turn - now.turn };
+            let block = &self.blocks[which];
+            let mut off = way / h - block.velocity(a, b);
+            for row in 0..3 {
+                if block.pieces[row].kind != kind::LOCKED {
+                    off[row] = 0.0;
+                }
+            }
+            let kept = if which == 0 { &mut self.state.remainder } else { &mut self.state.angular_remainder };
+            let before = vec3(*kept);
+            *kept = off.to_array();
+            let change = (off - before).length() / ((off.length() + before.length()) * KAPPA + 1e-9);
+            let smooth = 1.0 / (1.0 + change * change * change * change);
+            let belief = LEAST + (1.0 - LEAST) * still.max(smooth);
+            remainders[which] = off * belief;
+        }
+        remainders
+    }
+
+    /// What a projection of the poses is to take out, m and rad.
+    pub fn off(&self, joint: &Joint, which: usize) -> Vec3 {
+        let mut off = Vec3::ZERO;
+        for row in 0..3 {
+            let axis = 3 * which + row;
+            let coordinate = if which == 0 { self.frame.shift[row] } else { self.frame.turn[row] };
+            let drive = &joint.drives[axis];
+            off[row] = match self.blocks[which].pieces[row].kind {
+                // Of an axis that is locked by equal limits, those; else zero.
+                kind::LOCKED | kind::LOW => coordinate - drive.low,
+                kind::HIGH => coordinate - drive.high,
+                _ => 0.0,
+            };
+        }
+        off
+    }
+
+    /// What lasts of the joint after a step: it breaks where its last sub-step asked for too much.
+    pub fn lasting(&self, joint: &Joint, step: &StepParams) -> JointState {
+        let force = vec3(self.state.impulse).length() * step.inverse_h;
+        let torque = vec3(self.state.torque).length() * step.inverse_h;
+        let breaks = force > joint.break_force || torque > joint.break_torque;
+        let (mut separation, mut angle) = (Vec3::ZERO, Vec3::ZERO);
+        for row in 0..3 {
+            if self.blocks[0].pieces[row].kind == kind::LOCKED {
+                separation[row] = self.frame.shift[row] - joint.drives[row].low;
+            }
+            if self.blocks[1].pieces[row].kind == kind::LOCKED {
+                angle[row] = self.frame.turn[row] - joint.drives[3 + row].low;
+            }
+        }
+        JointState {
+            broken: self.state.broken | u32::from(breaks),
+            separation: separation.length(),
+            angle: angle.length(),
+            ..self.state
+        }
+    }
+
+    /// What it gives its bodies in this sub-step, in the world.
+    pub fn keep_impulses(&mut self) {
+        let [along, about] = &self.blocks;
+        self.state.impulse = (self.frame.along * along.impulse).to_array();
+        self.state.torque = (self.frame.about * about.impulse).to_array();
+    }
+}
+
+/// Turn of a body in a sub-step up to which a prediction of the separation is believed, rad.
+pub const THETA: f32 = 0.03;
+/// Relative change of a remainder up to which it is believed.
+pub const KAPPA: f32 = 0.2;
+/// What is believed of it at least.
+pub const LEAST: f32 = 0.3;
+/// Springs that differ by no more than this share are one.
+pub const SAME_SPRING: f32 = 0.1;
+/// Share of the geometric stiffness that joints add to the inertia.
+pub const STIFFENING: f32 = 2.0;
+
+/// Geometric stiffness of a joint at one of its bodies, as inertia over a sub-step: what a force at an arm does when the
+/// arm turns.
+pub fn stiffening(arm: Vec3, impulse: Vec3, h: f32) -> Mat3 {
+    let (pull, square) = (arm.dot(impulse), arm.dot(arm));
+    if pull <= 0.0 || square == 0.0 {
+        return Mat3::ZERO;
+    }
+    let outer = Mat3::from_cols(arm * arm.x, arm * arm.y, arm * arm.z);
+    (Mat3::IDENTITY - outer * (1.0 / square)) * (STIFFENING * h * pull)
+}
+
+/// The inertia of a body in the world with that of all its joints, inverted; zero where nothing turns it.
+pub fn inverse_inertia(rotation: Quat, props: &BodyProps, stiffening: Mat3) -> Mat3 {
+    let r = Mat3::from_quat(rotation);
+    if stiffening == Mat3::ZERO || vec3(props.inverse_inertia) == Vec3::ZERO {
+        return r * Mat3::from_diagonal(vec3(props.inverse_inertia)) * r.transpose();
+    }
+    (r * Mat3::from_diagonal(vec3(props.inertia)) * r.transpose() + stiffening).inverse()
+}
+
+/// The arm of a joint at a body, from its centre of mass to its own anchor, m.
+pub fn own_arm(joint: &Joint, second: bool, rotation: Quat) -> Vec3 {
+    rotate(rotation, vec3(if second { joint.anchor_b } else { joint.anchor_a }))
+}
