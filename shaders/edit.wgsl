@@ -217,6 +217,7 @@ fn read_props(record: EditRecord) -> BodyProps {
     read.angular_damping = bitcast<f32>(record.data[4].x);
     read.reach = bitcast<f32>(record.data[4].y);
     read.locked = record.data[4].z;
+    read.least_level = record.data[4].w;
     return read;
 }
 

@@ -73,7 +73,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         }
         BodyProps {
             inverse_inertia, inverse_mass, inertia, gravity_scale, center_of_mass, linear_damping, frame,
-            angular_damping, reach, locked, pad_c
+            angular_damping, reach, locked, least_level
         }
         Rest { position, time, rotation, island, pad_a, pad_b, pad_c }
         SolverBody {

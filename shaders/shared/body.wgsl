@@ -45,7 +45,7 @@ struct BodyProps {
     angular_damping: f32,
     reach: f32,
     locked: u32,
-    pad_c: u32,
+    least_level: u32,
 }
 
 struct Rest {

@@ -127,7 +127,7 @@ pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<PackedBody> {
         angular_damping: builder.angular_damping,
         reach,
         locked: builder.locked(),
-        ..BodyProps::zeroed()
+        least_level: builder.least_level(),
     };
     Ok(PackedBody { state, props, colliders })
 }

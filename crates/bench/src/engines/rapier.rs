@@ -49,6 +49,7 @@ impl RapierWorld {
                     .linear_damping(b.linear_damping)
                     .angular_damping(b.angular_damping)
                     .can_sleep(false)
+                    .additional_solver_iterations((b.substep_factor as usize - 1) * params.accuracy.fewest() as usize)
                     .enabled_translations(
                         b.enabled_translations[0],
                         b.enabled_translations[1],

@@ -102,8 +102,8 @@ pub struct BodyProps {
     pub reach: f32,
     /// [`locks`], of what can be pushed.
     pub locked: u32,
-    /// Unused.
-    pub pad_c: u32,
+    /// Level of sub-steps that its island gets at least, of what can be pushed.
+    pub least_level: u32,
 }
 
 /// Where a body came to rest, and for how long it has stayed there. 48 bytes. Lasts from step to step, where bodies may

@@ -17,6 +17,7 @@ pub use heaps::{balls, balls_seeded, mixed, mixed_seeded, pile, pile_seeded};
 pub use materials::{ball_column, ball_on_slope, conveyor, rolling_ball, spinning};
 pub use motion::{
     bouncing_ball, bullet, closed_system, cradle, free_box, free_fall, pulled_box, ramp, sliding_box, slip_to_roll,
+    t_handle, tumbling_box,
 };
 pub use stacks::{
     column, hub, large_on_small, many_pyramids, mass_ratio, overlap_cube, pyramid, topped_pyramid, wide_pyramid,

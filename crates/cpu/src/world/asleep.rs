@@ -285,7 +285,7 @@ impl Kept {
         ends: &[Ends],
         step: &StepParams,
     ) -> Vec<u32> {
-        match may_sleep(step).is_some() || step.tolerance >= 0.0 {
+        match may_sleep(step).is_some() || step.is_leveled() {
             true => island::label(states, manifolds, ends),
             false => Vec::new(),
         }

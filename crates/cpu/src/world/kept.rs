@@ -229,8 +229,8 @@ impl Kept {
         self.joints.reserve(&joints);
         let labels = self.labels(&states, &manifolds, &ends, step);
         control.islands = island::count(&labels);
-        if step.tolerance >= 0.0 {
-            level::decide(&mut states, &labels, &manifolds, &ends, step, &mut control);
+        if step.is_leveled() {
+            level::decide(&mut states, &self.props, &labels, &manifolds, &ends, step, &mut control);
         }
         let mut bodies: Vec<SolverBody> = (0..states.len())
             .into_par_iter()
