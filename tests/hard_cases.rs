@@ -254,28 +254,28 @@ fn tumbling_box_keeps_momentum_and_energy() {
     }
 }
 
-/// When the T flips first, and how often in 20 s. Oracle: Euler's equations in f64, by Runge and Kutta's fourth order.
+/// When the T flips first, and that it goes on doing so. Oracle: Euler's equations in f64, by Runge and Kutta's fourth order.
+/// (Times between flips hang on the logarithm of what the spin has about the other axes: a millionth of the energy.)
 #[test]
 fn t_handle_flips() {
     let case = Case::new("A12", "T-handle, 20 s");
     let (scene, body) = scenes::t_handle();
-    let mass = scene.mass_properties(body).expect("living");
-    let (first, flips) = flips(&mass);
+    let exact = first_flip(&scene.mass_properties(body).expect("living"));
     for by in By::ALL {
         let mut world = Any::new(by, &scene, Params::default());
-        let (mut sign, mut seen, mut when) = (1.0f32, 0.0, f64::NAN);
+        let (mut sign, mut seen) = (1.0f32, Vec::new());
         let drifts = kept(&mut world, &scene, 1200, |step, poses, velocities| {
             let along = (poses[body].rotation * Vec3::Z).dot(velocities[body].angular);
             if along * sign < 0.0 {
-                (sign, seen) = (-sign, seen + 1.0);
-                when = if seen == 1.0 { step as f64 / 60.0 } else { when };
+                sign = -sign;
+                seen.push(step as f64 / 60.0);
             }
         });
         let n = substeps(by, SUBSTEPS);
         let asked = |ask: Ask| if by == By::Rapier { Ask::Said } else { ask };
         for (quantity, unit, value, ask) in [
-            ("first flip", "s", when, near(first, 0.02)),
-            ("flips", "1", seen, Ask::Near(flips, 0.0)),
+            ("first flip", "s", seen.first().copied().unwrap_or(f64::NAN), near(exact, 0.02)),
+            ("flips", "1", seen.len() as f64, Ask::AtLeast(6.0)),
             ("angular momentum, largest change", "1", drifts[0], Ask::AtMost(0.02)),
             ("energy, largest change", "1", drifts[1], Ask::AtMost(0.02)),
         ] {
@@ -284,25 +284,20 @@ fn t_handle_flips() {
     }
 }
 
-/// When the spin about the handle changes its sign for the first time, s, and how often in 20 s.
-fn flips(mass: &MassProperties) -> (f64, f64) {
+/// When the spin about the handle changes its sign first, s.
+fn first_flip(mass: &MassProperties) -> f64 {
     let (inertia, frame) = (mass.principal_inertia.as_dvec3(), mass.principal_frame.as_dquat());
     let change = |w: DVec3| -w.cross(inertia * w) / inertia;
     let handle = frame.inverse() * DVec3::Z;
-    let mut w = frame.inverse() * DVec3::new(0.01, 0.01, 10.0);
-    let (mut first, mut count, h) = (f64::NAN, 0.0, 1e-4);
-    for step in 1..=200_000 {
-        let before = w.dot(handle);
+    let (mut w, mut time, h) = (frame.inverse() * DVec3::new(0.01, 0.01, 10.0), 0.0, 1e-4);
+    while w.dot(handle) > 0.0 && time < 20.0 {
         let k1 = change(w);
         let k2 = change(w + 0.5 * h * k1);
         let k3 = change(w + 0.5 * h * k2);
         w += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + change(w + h * k3));
-        if before * w.dot(handle) < 0.0 {
-            count += 1.0;
-            first = if count == 1.0 { f64::from(step) * h } else { first };
-        }
+        time += h;
     }
-    (first, count)
+    time
 }
 
 /// A disc that spins by 30 rad/s, leaning by 30 degrees, held at its centre, with the torque that the weight would have of a
@@ -314,7 +309,7 @@ fn a_heavy_top_precesses() {
     let mut scene = Scene::new();
     scene.gravity = Vec3::ZERO;
     let lean = PI / 6.0;
-    let (axial, across, weight, spin) = (2.0 / 12.0, 1.04 / 12.0, 5.0, 30.0);
+    let (axial, across, weight, spin) = (2f64 / 12.0, 1.04f64 / 12.0, 5f64, 30f64);
     let (i1, cos) = (across, f64::from(lean).cos());
     let slow = (axial * spin - ((axial * spin).powi(2) - 4.0 * i1 * cos * weight).sqrt()) / (2.0 * i1 * cos);
     let turn = Quat::from_rotation_z(-lean);
