@@ -69,7 +69,13 @@ impl Rows {
 
 impl Loose {
     /// A joint at the beginning of a step, and what lasts of it.
-    pub fn begin(scene: &Scene<'_>, slot: u32, state: JointState, bodies: &impl Store, step: &StepParams) -> (Self, JointState) {
+    pub fn begin(
+        scene: &Scene<'_>,
+        slot: u32,
+        state: JointState,
+        bodies: &impl Store,
+        step: &StepParams,
+    ) -> (Self, JointState) {
         let joint = &scene.set.joints[slot as usize];
         let slots = [joint.body_a, joint.body_b];
         let mut work = Work::new(slot, joint, state, between(scene, slots), step.h);
@@ -140,7 +146,15 @@ impl Loose {
     }
 
     /// Solves the rows as rigid, with the arms as they are now.
-    pub fn relax(&mut self, scene: &Scene<'_>, state: &mut JointState, slot: u32, a: &mut Body, b: &mut Body, step: &StepParams) {
+    pub fn relax(
+        &mut self,
+        scene: &Scene<'_>,
+        state: &mut JointState,
+        slot: u32,
+        a: &mut Body,
+        b: &mut Body,
+        step: &StepParams,
+    ) {
         let joint = &scene.set.joints[slot as usize];
         let mut work = Work::new(slot, joint, *state, between(scene, self.bodies), step.h);
         for which in 0..2 {
@@ -168,7 +182,14 @@ impl Loose {
     }
 
     /// What lasts of the joint after a step.
-    pub fn lasting(&self, scene: &Scene<'_>, slot: u32, state: JointState, bodies: &impl Store, step: &StepParams) -> JointState {
+    pub fn lasting(
+        &self,
+        scene: &Scene<'_>,
+        slot: u32,
+        state: JointState,
+        bodies: &impl Store,
+        step: &StepParams,
+    ) -> JointState {
         let joint = &scene.set.joints[slot as usize];
         let mut work = Work::new(slot, joint, state, between(scene, self.bodies), step.h);
         let [a, b] = self.bodies.map(|slot| Body::of(&bodies.get(slot as usize), &scene.states[slot as usize]));
@@ -191,7 +212,13 @@ fn between(scene: &Scene<'_>, bodies: [u32; 2]) -> Vec3 {
 }
 
 /// The body's inertia with the geometric stiffness of its joints; `impulse` is that of the joint at a place.
-pub fn stiffen(scene: &Scene<'_>, info: &JointBody, impulse: impl Fn(u32) -> Vec3, body: &mut SolverBody, step: &StepParams) {
+pub fn stiffen(
+    scene: &Scene<'_>,
+    info: &JointBody,
+    impulse: impl Fn(u32) -> Vec3,
+    body: &mut SolverBody,
+    step: &StepParams,
+) {
     let slot = info.body as usize;
     let (seen, mut more) = (Body::of(body, &scene.states[slot]), Mat3::ZERO);
     if seen.inverse_mass == 0.0 {
@@ -204,7 +231,6 @@ pub fn stiffen(scene: &Scene<'_>, info: &JointBody, impulse: impl Fn(u32) -> Vec
         let impulse = impulse(end / 2);
         more += stiffening(arm, if end & 1 == 1 { impulse } else { -impulse }, step.h);
     }
-    let i = inverse_inertia(seen.pose.rotation, &scene.props[slot], more);
-    body.inverse_inertia_diagonal = [i.x_axis.x, i.y_axis.y, i.z_axis.z];
-    body.inverse_inertia_off = [i.x_axis.y, i.x_axis.z, i.y_axis.z];
+    let stiffened = inverse_inertia(seen.pose.rotation, &scene.props[slot], more);
+    *body = Body { inverse_inertia: stiffened, ..seen }.put_inertia(*body);
 }

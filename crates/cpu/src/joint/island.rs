@@ -7,7 +7,7 @@
 
 use super::rows::{Body, Work, inverse_inertia, own_arm, stiffening};
 use crate::math::{quat, vec3};
-use glam::{Mat3, Quat, Vec3};
+use glam::{Mat3, Vec3};
 use tumble_core::layout::{
     BodyProps, BodyState, JointBlock, JointEntry, JointIsland, JointState, NO_BODY, SolverBody, StepParams, joint_bits,
 };
@@ -19,8 +19,6 @@ pub const REGULARIZATION: f32 = 1e-6;
 pub const CYCLE_REGULARIZATION: f32 = 1e-5;
 /// How often pieces are chosen in a sub-step.
 pub const CHOICES: u32 = 3;
-/// Largest turn of a body by a projection, rad.
-pub const MAX_PROJECTION: f32 = 0.5;
 
 /// The joints of an island and their bodies, while a step runs.
 #[derive(Debug, Default, Clone)]
@@ -138,9 +136,7 @@ impl Island {
                 let start = quat(scene.states[slot as usize].rotation);
                 new.delta = (body.pose.rotation * start.conjugate()).normalize().to_array();
             }
-            let i = body.inverse_inertia;
-            new.inverse_inertia_diagonal = [i.x_axis.x, i.y_axis.y, i.z_axis.z];
-            new.inverse_inertia_off = [i.x_axis.y, i.x_axis.z, i.y_axis.z];
+            new = body.put_inertia(new);
             bodies.set(slot as usize, new);
         }
     }
@@ -162,10 +158,8 @@ impl Island {
             if changed {
                 self.rebuild(scene);
             }
-            for (work, &[a, b]) in self.works.iter_mut().zip(&self.ends) {
-                let [a, b] = pair(&mut self.bodies, a, b);
-                work.push_fixed(a, b);
-            }
+            self.works.iter_mut().for_each(Work::fix);
+            self.push(|work, second, body| work.push_fixed(second, body));
             self.solve_rows(topology, |island, joint, which| {
                 let [a, b] = island.ends[joint];
                 island.works[joint].lack(which, &island.bodies[a], &island.bodies[b], false) - remainders[joint][which]
@@ -299,11 +293,18 @@ impl Island {
         let blocks = &topology.blocks[info.first_block as usize..][..info.block_count as usize];
         for (k, block) in blocks.iter().enumerate() {
             let (joint, which) = place(&info, block.row);
-            let impulse = self.values[k];
-            let [a, b] = pair(&mut self.bodies, self.ends[joint][0], self.ends[joint][1]);
-            let block = &mut self.works[joint].blocks[which];
-            block.impulse += impulse;
-            block.push(impulse, a, b);
+            self.works[joint].blocks[which].push = self.values[k];
+            self.works[joint].blocks[which].impulse += self.values[k];
+        }
+        self.push(Work::push);
+    }
+
+    /// Gives each body what all its joints give it.
+    fn push(&mut self, push: impl Fn(&Work, bool, &mut Body)) {
+        for (body, at) in self.bodies.iter_mut().zip(&self.joints_at) {
+            for &end in at {
+                push(&self.works[end as usize / 2], end & 1 == 1, body);
+            }
         }
     }
 
@@ -341,20 +342,17 @@ impl Island {
             -work.off(&scene.set.joints[work.slot as usize], which)
         });
         let Some(info) = self.info else { return };
-        let still = |body: &Body| Body { linear: Vec3::ZERO, angular: Vec3::ZERO, ..*body };
-        let mut moved: Vec<Body> = self.bodies.iter().map(still).collect();
         let blocks = &topology.blocks[info.first_block as usize..][..info.block_count as usize];
         for (k, block) in blocks.iter().enumerate() {
             let (joint, which) = place(&info, block.row);
-            let [a, b] = pair(&mut moved, self.ends[joint][0], self.ends[joint][1]);
-            self.works[joint].blocks[which].push(self.values[k], a, b);
+            self.works[joint].blocks[which].push = self.values[k];
         }
-        for (body, way) in self.bodies.iter_mut().zip(&moved).filter(|(body, _)| body.inverse_mass > 0.0) {
-            let angle = way.angular.length();
-            let turn = way.angular * (if angle > MAX_PROJECTION { 0.5 * MAX_PROJECTION / angle } else { 0.5 });
-            body.pose.translation += way.linear;
-            let turn = Quat::from_xyzw(turn.x, turn.y, turn.z, 1.0).normalize();
-            body.pose.rotation = (turn * body.pose.rotation).normalize();
+        for (body, at) in self.bodies.iter_mut().zip(&self.joints_at).filter(|(body, _)| body.inverse_mass > 0.0) {
+            let mut way = Body { linear: Vec3::ZERO, angular: Vec3::ZERO, ..*body };
+            for &end in at {
+                self.works[end as usize / 2].push(end & 1 == 1, &mut way);
+            }
+            body.pose = body.pose.moved(way.linear, way.angular);
         }
     }
 }
@@ -362,9 +360,4 @@ impl Island {
 /// Joint and block of a row's number.
 fn place(info: &JointIsland, row: u32) -> (usize, usize) {
     ((row / 2 - info.first_joint) as usize, (row % 2) as usize)
-}
-
-/// Two different bodies.
-fn pair(bodies: &mut [Body], a: usize, b: usize) -> [&mut Body; 2] {
-    bodies.get_disjoint_mut([a, b]).expect("a joint has two different bodies")
 }

@@ -13,8 +13,8 @@ pub mod rows;
 
 use crate::math::{finite, vec3};
 use crate::shared::Shared;
-use bytemuck::Zeroable;
 use batches::Loose;
+use bytemuck::Zeroable;
 use island::{Island, Scene, Store};
 use rows::Body;
 use std::ops::Range;
@@ -95,7 +95,12 @@ impl Joints {
     }
 
     /// The passes of a step over these joints.
-    pub(crate) fn running<'a>(&'a mut self, set: &'a JointSet, states: &'a [BodyState], props: &'a [BodyProps]) -> Running<'a> {
+    pub(crate) fn running<'a>(
+        &'a mut self,
+        set: &'a JointSet,
+        states: &'a [BodyState],
+        props: &'a [BodyProps],
+    ) -> Running<'a> {
         Running {
             scene: Scene { set, states, props },
             states: &self.states,
@@ -151,11 +156,14 @@ impl Running<'_> {
     /// Some of a stage's islands, bodies or joints. Those of a stage share nothing that is written.
     pub(crate) fn run(&self, part: Part, range: Range<usize>, bodies: &Shared<'_, SolverBody>, step: &StepParams) {
         match part {
-            Part::Begin | Part::Solve | Part::Relax => range.for_each(|index| self.run_island(part, index, bodies, step)),
+            Part::Begin | Part::Solve | Part::Relax => {
+                range.for_each(|index| self.run_island(part, index, bodies, step))
+            }
             Part::Stiffen => range.for_each(|index| self.stiffen(index, bodies, step)),
             _ => {
                 // SAFETY: a joint is in one block of one stage.
-                let (loose, states) = unsafe { (self.loose.slice_mut(range.clone()), self.loose_states.slice_mut(range.clone())) };
+                let (loose, states) =
+                    unsafe { (self.loose.slice_mut(range.clone()), self.loose_states.slice_mut(range.clone())) };
                 let first = self.scene.set.topology.direct_joints() as usize + range.start;
                 for (index, (loose, state)) in loose.iter_mut().zip(states).enumerate() {
                     let slot = self.scene.set.topology.joints[first + index];
@@ -170,7 +178,15 @@ impl Running<'_> {
         }
     }
 
-    fn visit(&self, part: Part, slot: u32, loose: &mut Loose, state: &mut JointState, bodies: &Shared<'_, SolverBody>, step: &StepParams) {
+    fn visit(
+        &self,
+        part: Part,
+        slot: u32,
+        loose: &mut Loose,
+        state: &mut JointState,
+        bodies: &Shared<'_, SolverBody>,
+        step: &StepParams,
+    ) {
         let slots = loose.bodies.map(|slot| slot as usize);
         let before = slots.map(|slot| Store::get(bodies, slot));
         let [mut a, mut b] = [0, 1].map(|end| Body::of(&before[end], &self.scene.states[slots[end]]));

@@ -26,16 +26,27 @@ pub struct Body {
     pub pose: Pose,
 }
 
+/// Largest turn of a body by a projection, rad.
+pub const MAX_PROJECTION: f32 = 0.5;
+
+impl Pose {
+    /// Moved by a way and a turn, m and rad.
+    pub fn moved(&self, way: Vec3, turn: Vec3) -> Self {
+        let angle = turn.length();
+        let half = turn * (if angle > MAX_PROJECTION { 0.5 * MAX_PROJECTION / angle } else { 0.5 });
+        let turn = Quat::from_xyzw(half.x, half.y, half.z, 1.0).normalize();
+        Self { translation: self.translation + way, rotation: (turn * self.rotation).normalize() }
+    }
+}
+
 impl Body {
     /// As the solver has it.
     pub fn of(body: &SolverBody, state: &BodyState) -> Self {
-        let [xx, yy, zz] = body.inverse_inertia_diagonal;
-        let [xy, xz, yz] = body.inverse_inertia_off;
         Self {
             linear: vec3(body.linear_velocity),
             angular: vec3(body.angular_velocity),
             inverse_mass: body.inverse_mass,
-            inverse_inertia: Mat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]),
+            inverse_inertia: inverse_inertia_of(body),
             pose: Pose {
                 translation: vec3(body.translation),
                 rotation: (quat(body.delta) * quat(state.rotation)).normalize(),
@@ -53,6 +64,21 @@ impl Body {
         body
     }
 
+    /// The solver's body with this inertia. What contacts will add again to its angular velocity is what their torques do
+    /// to the new inertia: that of a light body may have changed a hundredfold.
+    pub fn put_inertia(&self, mut body: SolverBody) -> SolverBody {
+        let before = inverse_inertia_of(&body);
+        let carried = vec3(body.angular_velocity) - vec3(body.angular_start);
+        if before.determinant() > 0.0 && carried != Vec3::ZERO {
+            let carried = self.inverse_inertia * (before.inverse() * carried);
+            body.angular_start = (vec3(body.angular_velocity) - carried).to_array();
+        }
+        let i = self.inverse_inertia;
+        body.inverse_inertia_diagonal = [i.x_axis.x, i.y_axis.y, i.z_axis.z];
+        body.inverse_inertia_off = [i.x_axis.y, i.x_axis.z, i.y_axis.z];
+        body
+    }
+
     /// Where it is after h, as far as its velocities tell.
     fn predicted(&self, h: f32) -> Pose {
         let half = 0.5 * h * self.angular;
@@ -63,6 +89,12 @@ impl Body {
         let turn = if square < 1.0 { Quat::from_xyzw(half.x, half.y, half.z, 1.0).normalize() } else { turn };
         Pose { translation: self.pose.translation + h * self.linear, rotation: (turn * self.pose.rotation).normalize() }
     }
+}
+
+fn inverse_inertia_of(body: &SolverBody) -> Mat3 {
+    let [xx, yy, zz] = body.inverse_inertia_diagonal;
+    let [xy, xz, yz] = body.inverse_inertia_off;
+    Mat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz])
 }
 
 /// Up to three rows.
@@ -80,6 +112,8 @@ pub struct Block {
     pub response_b: Mat3,
     /// Impulses of this sub-step, N s or N m s.
     pub impulse: Vec3,
+    /// What they give now.
+    pub push: Vec3,
     /// Change of the rows' own velocities by a unit impulse, where all rows would be active.
     pub own: Vec3,
     /// Pieces of the three rows.
@@ -114,15 +148,6 @@ impl Block {
     pub fn velocity(&self, a: &Body, b: &Body) -> Vec3 {
         self.along.transpose() * (b.linear - a.linear)
             + (self.turn_b.transpose() * b.angular - self.turn_a.transpose() * a.angular)
-    }
-
-    /// Gives the bodies an impulse of the rows.
-    pub fn push(&self, impulse: Vec3, a: &mut Body, b: &mut Body) {
-        let along = self.along * impulse;
-        a.linear -= a.inverse_mass * along;
-        a.angular -= self.response_a * impulse;
-        b.linear += b.inverse_mass * along;
-        b.angular += self.response_b * impulse;
     }
 
     /// The block on the diagonal of the system; rows that are not active have a one.
@@ -182,8 +207,7 @@ impl Work {
         let Frame { arm_a, arm_b, along, about, .. } = self.frame;
         let masses = a.inverse_mass + b.inverse_mass;
         for (which, block) in self.blocks.iter_mut().enumerate() {
-            let rows =
-                self.axes >> (3 * which) & 7 | self.axes >> (joint_bits::DRIVEN + 3 * which as u32) & 7;
+            let rows = self.axes >> (3 * which) & 7 | self.axes >> (joint_bits::DRIVEN + 3 * which as u32) & 7;
             for row in 0..3 {
                 let axis = if rows >> row & 1 == 0 {
                     Vec3::ZERO
@@ -227,27 +251,42 @@ impl Work {
         changed
     }
 
-    /// Gives the bodies what rows of a fixed impulse are to have given.
-    pub fn push_fixed(&mut self, a: &mut Body, b: &mut Body) {
-        let Frame { arm_a, arm_b, along, about, .. } = self.frame;
-        for axis in 0..6 {
-            let (which, row) = (axis / 3, axis % 3);
-            let block = &mut self.blocks[which];
-            let more = block.pieces[row].goal - block.impulse[row];
-            if block.pieces[row].kind != kind::FIXED || more == 0.0 {
-                continue;
-            }
-            block.impulse[row] = block.pieces[row].goal;
-            let (push, turn_a, turn_b) = if which == 0 {
-                let axis = more * along.col(row);
-                (axis, arm_a.cross(axis), arm_b.cross(axis))
+    /// Gives a body what the rows give now.
+    pub fn push(&self, second: bool, body: &mut Body) {
+        for block in &self.blocks {
+            let along = block.along * block.push;
+            if second {
+                body.linear += body.inverse_mass * along;
+                body.angular += block.response_b * block.push;
             } else {
-                (Vec3::ZERO, more * about.col(row), more * about.col(row))
-            };
-            a.linear -= a.inverse_mass * push;
-            a.angular -= a.inverse_inertia * turn_a;
-            b.linear += b.inverse_mass * push;
-            b.angular += b.inverse_inertia * turn_b;
+                body.linear -= body.inverse_mass * along;
+                body.angular -= block.response_a * block.push;
+            }
+        }
+    }
+
+    /// What rows of a fixed impulse are still to give; others give nothing.
+    pub fn fix(&mut self) {
+        for block in &mut self.blocks {
+            for row in 0..3 {
+                let fixed = block.pieces[row].kind == kind::FIXED;
+                block.push[row] = if fixed { block.pieces[row].goal - block.impulse[row] } else { 0.0 };
+                block.impulse[row] += block.push[row];
+            }
+        }
+    }
+
+    /// Gives a body what rows of a fixed impulse give now: they are in no block of the system.
+    pub fn push_fixed(&self, second: bool, body: &mut Body) {
+        let push = self.frame.along * self.blocks[0].push;
+        let arm = if second { self.frame.arm_b } else { self.frame.arm_a };
+        let turn = body.inverse_inertia * (arm.cross(push) + self.frame.about * self.blocks[1].push);
+        if second {
+            body.linear += body.inverse_mass * push;
+            body.angular += turn;
+        } else {
+            body.linear -= body.inverse_mass * push;
+            body.angular -= turn;
         }
     }
 
