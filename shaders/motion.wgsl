@@ -162,6 +162,14 @@ fn integrate_position(i: u32) {
     if kind == BODY_NONE || kind == BODY_FIXED || (work_states[i].flags & STILL) != 0u {
         return;
     }
+    let locked = props[i].locked;
+    if locked != 0u && moves(work_states[i].flags) {
+        // Whatever pushed it.
+        let linear = select(solver_bodies[i].linear_velocity, vec3<f32>(), three_bits(locked, 0u));
+        let turns = three_bits(locked, LOCKED_FIRST_ROTATION);
+        solver_bodies[i].linear_velocity = linear;
+        solver_bodies[i].angular_velocity = select(solver_bodies[i].angular_velocity, vec3<f32>(), turns);
+    }
     var way = solver_bodies[i].linear_velocity * step.h;
     if (solver_bodies[i].touched & TOUCHED_ANY) == 0u && kind == BODY_DYNAMIC {
         way -= acceleration(i) * (0.5 * step.h * step.h);

@@ -292,3 +292,34 @@ fn bad_targets_are_refused() {
         assert_eq!(world.edit().set_next_kinematic_pose(own, Vec3::ONE.into()).unwrap_err(), Error::StaleBody(own));
     }
 }
+
+/// Damping and the factor on gravity, each by itself and together. Oracles: analysis, exp(-c t) within the half c² h t that
+/// implicit steps of length h are off, and the fall at g s / c in the end.
+#[test]
+fn damping_and_gravity_scale_do_what_they_say() {
+    let throw = Vec3::new(3.0, 1.0, -2.0);
+    let mut scene = Scene::new();
+    let mut insert = |x: f32, body: RigidBodyBuilder| {
+        let body = body.translation(Vec3::X * x).linvel(throw).angvel(throw);
+        scene.insert(body, ColliderBuilder::ball(0.5)).body
+    };
+    let dynamic = RigidBodyBuilder::dynamic;
+    let floats = insert(0.0, dynamic().gravity_scale(0.0).linear_damping(0.5).angular_damping(2.0));
+    let rises = insert(50.0, dynamic().gravity_scale(-2.5));
+    let sinks = insert(100.0, dynamic().gravity_scale(1.5).linear_damping(8.0));
+    let h = DT / 8.0;
+    for side in SIDES {
+        let mut world = side.world(&scene, &Params::default());
+        steps(&mut world, 120);
+        let moved = velocity(&mut world, floats);
+        let lost = |c: f64| throw.as_dvec3() * (-2.0 * c).exp();
+        assert_near(&format!("{side:?}, slows"), moved.linear.as_dvec3(), lost(0.5), 1.1 * 0.5 * 0.5 * 0.5 * h * 2.0);
+        assert_near(&format!("{side:?}, turns"), moved.angular.as_dvec3(), lost(2.0), 1.1 * 0.5 * 2.0 * 2.0 * h * 2.0);
+        let way = throw.as_dvec3() * 2.0 * (1.0 - (-1f64).exp());
+        assert_near(&format!("{side:?}, way"), pose(&mut world, floats).translation.as_dvec3(), way, 1e-3); // 3.0e-4
+        let risen = throw.as_dvec3() * 2.0 + DVec3::Y * (2.5 * 9.81 * 2.0) + DVec3::X * 50.0;
+        assert_near(&format!("{side:?}, rises"), pose(&mut world, rises).translation.as_dvec3(), risen, 1e-5);
+        let speed = velocity(&mut world, sinks).linear.as_dvec3();
+        assert_near(&format!("{side:?}, sinks"), speed, DVec3::NEG_Y * (1.5 * 9.81 / 8.0), 1e-5);
+    }
+}

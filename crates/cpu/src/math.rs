@@ -44,10 +44,15 @@ pub(crate) fn rotation_vector(q: Quat) -> Vec3 {
     axis * (16.0 * sixteenth * series)
 }
 
+/// What is left of `v` where none of three bits is set, `first` being the lowest; zero elsewhere, whatever `v` is.
+pub(crate) fn unlocked(v: Vec3, word: u32, first: u32) -> Vec3 {
+    let left = |axis: u32, x: f32| if word >> (first + axis) & 1 == 0 { x } else { 0.0 };
+    Vec3::new(left(0, v.x), left(1, v.y), left(2, v.z))
+}
+
 /// Three bits, `first` being the lowest: 1 where they are not set.
 pub(crate) fn free(word: u32, first: u32) -> Vec3 {
-    let free = |bit: u32| if word >> (first + bit) & 1 == 0 { 1.0 } else { 0.0 };
-    Vec3::new(free(0), free(1), free(2))
+    unlocked(Vec3::ONE, word, first)
 }
 
 /// Whether the body does not move along some axis.
@@ -57,7 +62,7 @@ pub(crate) fn is_locked(body: &SolverBody) -> bool {
 
 /// What is left of a push on the body where axes are locked.
 pub(crate) fn along_free(body: &SolverBody, push: Vec3) -> Vec3 {
-    if is_locked(body) { push * free(body.touched, touched::FIRST_LOCK) } else { push }
+    if is_locked(body) { unlocked(push, body.touched, touched::FIRST_LOCK) } else { push }
 }
 
 /// The inverse of the inertia of a body that is held about the locked axes of the world, from its principal moments: that

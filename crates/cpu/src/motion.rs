@@ -1,7 +1,7 @@
 //! Stage `motion`: bodies move; the step's result becomes the state. Twin of `shaders/motion.wgsl`.
 
 use crate::bounds::{STATE_LIMIT, moves};
-use crate::math::{finite, free, quat, rotate, rotate_back, vec3};
+use crate::math::{finite, quat, rotate, rotate_back, unlocked, vec3};
 use crate::solver::one_pass::ease;
 use glam::{Quat, Vec3};
 use tumble_core::layout::{BodyProps, BodyState, SolverBody, StepParams, body_flags, locks, touched};
@@ -15,7 +15,7 @@ const STILL: u32 = body_flags::FROZEN | body_flags::ASLEEP;
 /// Acceleration by gravity and force, m/s²; none along locked axes.
 fn acceleration(state: &BodyState, props: &BodyProps, step: &StepParams) -> Vec3 {
     let all = vec3(step.gravity) * props.gravity_scale + vec3(state.force) * props.inverse_mass;
-    all * free(props.locked, 0)
+    unlocked(all, props.locked, 0)
 }
 
 /// Gravity, force, torque and damping over one sub-step.
@@ -113,6 +113,12 @@ pub fn integrate_position(body: &mut SolverBody, state: &BodyState, props: &Body
     let kind = state.flags & body_flags::KIND;
     if kind == body_flags::NONE || kind == body_flags::FIXED || state.flags & STILL != 0 {
         return;
+    }
+    if props.locked != 0 && moves(state.flags) {
+        // Whatever pushed it.
+        body.linear_velocity = unlocked(vec3(body.linear_velocity), props.locked, 0).to_array();
+        let turns = unlocked(vec3(body.angular_velocity), props.locked, locks::FIRST_ROTATION);
+        body.angular_velocity = turns.to_array();
     }
     let mut way = vec3(body.linear_velocity) * step.h;
     if body.touched & touched::ANY == 0 && kind == body_flags::DYNAMIC {

@@ -6,7 +6,7 @@ use super::split;
 use crate::bounds::moves;
 use crate::contact::NO_FEATURE;
 use crate::math::{
-    along_free, free, held_inverse_inertia, inverse_inertia_times, is_locked, quat, rotate, tangents, vec3,
+    along_free, free, held_inverse_inertia, inverse_inertia_times, is_locked, quat, rotate, tangents, unlocked, vec3,
 };
 use bytemuck::Zeroable;
 use glam::{Mat3, Vec3};
@@ -57,8 +57,8 @@ pub fn prepare_body(state: &BodyState, props: &BodyProps, mask: u64, step: &Step
 fn lock(body: &mut SolverBody, state: &BodyState, props: &BodyProps) {
     body.touched |= (props.locked & locks::TRANSLATIONS) << touched::FIRST_LOCK;
     let turns = free(props.locked, locks::FIRST_ROTATION);
-    body.linear_velocity = (vec3(body.linear_velocity) * free(props.locked, 0)).to_array();
-    body.angular_velocity = (vec3(body.angular_velocity) * turns).to_array();
+    body.linear_velocity = unlocked(vec3(body.linear_velocity), props.locked, 0).to_array();
+    body.angular_velocity = unlocked(vec3(body.angular_velocity), props.locked, locks::FIRST_ROTATION).to_array();
     if props.locked & locks::ROTATIONS != 0 {
         let [diagonal, off] = held_inverse_inertia(quat(state.rotation), vec3(props.inertia), turns);
         body.inverse_inertia_diagonal = diagonal.to_array();
