@@ -6,11 +6,12 @@
 //
 //   find_old       one thread a pair of the last step: dead_rank = 1 if it is gone. Reads pairs, pair_keys, colliders.
 //   (primitives/scan of dead_rank, total to DEAD_COUNT)
-//   find_new       one thread a pair: next_pairs, fresh_rank = 1 if it is new. Reads pair_keys, pairs, colliders.
+//   find_new       one thread a pair: next_pairs, fresh_rank = 1 if it is new. Reads pair_keys, pairs, colliders, apart.
 //   (primitives/scan of fresh_rank, total to NEW_COUNT)
 //   list_dead      one thread a pair of the last step: dead_slots, in the order of that list. Reads dead_rank, pairs.
 //   assign         one thread a pair: slots of new ones in next_pairs, empty manifolds; counts pairs that no narrow
-//                  phase treats (two half-spaces) as visited. Reads fresh_rank, dead_slots, free_slots.
+//                  phase treats (two half-spaces, or bodies that joints keep from colliding) as visited. Reads fresh_rank,
+//                  dead_slots, free_slots.
 // and once the step is known to be good (all of these return when it stopped):
 //   commit_pairs   one thread a pair: pairs = next_pairs; batch_of_slot; slot_impulses of pairs that do not touch.
 //                  Reads manifolds, pair_batch.
@@ -52,6 +53,7 @@ const NEXT_FROZEN_COUNT: u32 = 108u;
 @group(0) @binding(14) var<storage, read_write> slot_impulses: array<Impulse>;
 @group(0) @binding(15) var<storage, read> work_states: array<BodyState>;
 @group(0) @binding(16) var<storage, read_write> found_manifolds: array<FoundManifold>;
+@group(0) @binding(17) var<storage, read> apart: array<vec2<u32>>; // their number, then sorted pairs of bodies
 
 // Which pass treats a pair of these shapes.
 fn kind_of(a: u32, b: u32) -> u32 {
@@ -116,6 +118,26 @@ fn old_slot(a: u32, b: u32) -> u32 {
     return NO_SLOT;
 }
 
+// Whether joints keep two bodies from colliding.
+fn are_apart(a: u32, b: u32) -> bool {
+    let count = apart[0].x;
+    let low_body = min(a, b);
+    let high_body = max(a, b);
+    var low = 0u;
+    var high = count;
+    // 26 turns at most: there are no more joints.
+    for (var turn = 0u; turn < 27u && low < high; turn++) {
+        let middle = low + (high - low) / 2u;
+        let pair = apart[1u + middle];
+        if precedes(pair.x, pair.y, low_body, high_body) {
+            low = middle + 1u;
+        } else {
+            high = middle;
+        }
+    }
+    return low < count && all(apart[1u + low] == vec2<u32>(low_body, high_body));
+}
+
 @compute @workgroup_size(256)
 fn find_old(
     @builtin(workgroup_id) wg: vec3<u32>,
@@ -144,7 +166,10 @@ fn find_new(
     }
     let a = pair_keys[2u * i];
     let b = pair_keys[2u * i + 1u];
-    let kind = kind_of(colliders[a].shape, colliders[b].shape);
+    var kind = kind_of(colliders[a].shape, colliders[b].shape);
+    if apart[0].x != 0u && are_apart(colliders[a].body, colliders[b].body) {
+        kind = PAIR_NONE;
+    }
     var slot = NO_SLOT;
     if !newborn(a, b) {
         slot = old_slot(a, b);

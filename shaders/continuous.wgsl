@@ -70,6 +70,9 @@ fn shorten(
         return;
     }
     let pair = next_pairs[i];
+    if (pair.kind & PAIR_MASK) == PAIR_NONE {
+        return; // a joint keeps them from colliding
+    }
     if moves(work_states[colliders[pair.a].body].flags) {
         shorten_one(pair.a, pair.b);
     } else {

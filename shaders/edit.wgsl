@@ -165,7 +165,7 @@ fn apply_to_body(record: EditRecord, state: ptr<function, BodyState>, own_props:
             let position = a + rotate(own, (*own_props).center_of_mass);
             let turn = multiply(unit(multiply(own, (*own_props).frame)), conjugate((*state).rotation));
             (*state).linear_velocity = (position - (*state).position) / step.dt;
-            (*state).angular_velocity = rotation_vector(turn) / step.dt;
+            (*state).angular_velocity = scaled_axis(turn) / step.dt;
         }
         default: {
             (*state).flags |= BODY_FROZEN;

@@ -1,15 +1,16 @@
-// Stage `island`: which moving bodies hang together by contacts. Twin of crates/cpu/src/island.rs.
+// Stage `island`: which moving bodies hang together by contacts and joints. Twin of crates/cpu/src/island.rs.
 //
-// An island is a connected component of bodies that move over contacts with points; its label is the lowest slot of its
-// bodies. Union-find with an atomic minimum for a hook, after Playne and Hawick, "A New Algorithm for Parallel
-// Connected-Component Labelling on GPUs" (IEEE TPDS, 2018): each contact hangs the higher of its two roots under the
+// An island is a connected component of bodies that move over contacts with points and over joints, broken or not; its
+// label is the lowest slot of its bodies. Union-find with an atomic minimum for a hook, after Playne and Hawick, "A New Algorithm for Parallel
+// Connected-Component Labelling on GPUs" (IEEE TPDS, 2018): each of these hangs the higher of its two roots under the
 // lower, and one that comes too late goes on with what it finds there. No invocation waits for another, labels only
 // fall, and where all hooks are made they are minima, whatever the order.
 //
-//   begin    one thread a body: its own label, NO_ISLAND if it does not move. Reads work_states; writes islands
-//   hook     one thread a pair: joins the islands of its bodies. Reads next_pairs, manifolds, aabbs; writes islands
-//   flatten  one thread a body: goes down to the root, so far as its turns allow. Writes islands
-//   count    the same again, all the way; counts islands in counters
+//   begin        one thread a body: its own label, NO_ISLAND if it does not move. Reads work_states; writes islands
+//   hook         one thread a pair: joins the islands of its bodies. Reads next_pairs, manifolds, aabbs; writes islands
+//   hook_joined  one thread a pair of bodies with joints between them: the same. Reads joined, work_states; writes islands
+//   flatten      one thread a body: goes down to the root, so far as its turns allow. Writes islands
+//   count        the same again, all the way; counts islands in counters
 //
 // Turns are bounded. Where they do not suffice, which no graph has been seen to do, ISLANDS_OPEN is raised in counters,
 // and labels are worth nothing in this step.
@@ -33,6 +34,7 @@ const FLATTEN_TURNS: u32 = 4096u;
 @group(0) @binding(4) var<storage, read> manifolds: array<Manifold>;
 @group(0) @binding(5) var<storage, read> aabbs: array<Aabb>;
 @group(0) @binding(6) var<storage, read_write> islands: array<atomic<u32>>;
+@group(0) @binding(7) var<storage, read> joined: array<vec2<u32>>; // their number, then pairs of bodies
 
 var<workgroup> roots: atomic<u32>;
 
@@ -60,11 +62,31 @@ fn hook(
     }
     let body_a = aabbs[next_pairs[i].a].body;
     let body_b = aabbs[next_pairs[i].b].body;
-    if (body_a & body_b & AABB_DYNAMIC) == 0u {
+    if (body_a & body_b & AABB_DYNAMIC) != 0u {
+        join(body_a & AABB_INDEX, body_b & AABB_INDEX);
+    }
+}
+
+@compute @workgroup_size(256)
+fn hook_joined(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i >= joined[0].x {
         return;
     }
-    var a = body_a & AABB_INDEX;
-    var b = body_b & AABB_INDEX;
+    let pair = joined[1u + i];
+    if moves(work_states[pair.x].flags) && moves(work_states[pair.y].flags) {
+        join(pair.x, pair.y);
+    }
+}
+
+// Makes the islands of two bodies that move one.
+fn join(body_a: u32, body_b: u32) {
+    var a = body_a;
+    var b = body_b;
     // One loop, since some drivers count the turns of an inner one again and again.
     for (var turn = 0u; turn < HOOK_TURNS; turn++) {
         let below_a = atomicLoad(&islands[a]);

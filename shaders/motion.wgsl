@@ -5,6 +5,7 @@
 //   integrate_positions    translation and delta there
 //   rewind                 translation and delta of what nothing moves as at first
 //   first_substep, next_substep, last_substep   both, as one pass wants it
+//   move_body, move_last, start_next   the same where there are joints, which come between
 //   commit                 `states` from `solver_bodies`, `shares` and `work_states`; counts and names bodies in quarantine
 //   write_poses            `poses`, the bodies' own frames for users and renderers, from `states` and `props`
 //
@@ -56,14 +57,16 @@ fn integrate_velocity(i: u32) {
     if !moves(work_states[i].flags) {
         return;
     }
-    let linear = solver_bodies[i].linear_velocity + acceleration(i) * step.h;
+    // Of two half kicks the first.
+    let h = select(step.h, 0.5 * step.h, (solver_bodies[i].touched & TOUCHED_JOINED) != 0u);
+    let linear = solver_bodies[i].linear_velocity + acceleration(i) * h;
     solver_bodies[i].linear_velocity = linear * (1.0 / (1.0 + step.h * props[i].linear_damping));
     let turn = symmetric_times(
         solver_bodies[i].inverse_inertia_diagonal,
         solver_bodies[i].inverse_inertia_off,
         work_states[i].torque,
     );
-    let angular = solver_bodies[i].angular_velocity + turn * step.h;
+    let angular = solver_bodies[i].angular_velocity + turn * h;
     solver_bodies[i].angular_velocity = angular * (1.0 / (1.0 + step.h * props[i].angular_damping));
 }
 
@@ -242,6 +245,77 @@ fn next_substep(
     if solver_bodies[i].inverse_mass > 0.0 {
         solver_bodies[i].linear_velocity = solver_bodies[i].linear_velocity + linear;
         solver_bodies[i].angular_velocity = solver_bodies[i].angular_velocity + angular;
+    }
+}
+
+// The second half of gravity and forces, for bodies that joints hold; no load of contacts of this sub-step.
+fn kick_again(i: u32) {
+    if !moves(work_states[i].flags) || (solver_bodies[i].touched & TOUCHED_JOINED) == 0u {
+        return;
+    }
+    let linear = acceleration(i) * (0.5 * step.h);
+    let angular = symmetric_times(
+        solver_bodies[i].inverse_inertia_diagonal,
+        solver_bodies[i].inverse_inertia_off,
+        work_states[i].torque,
+    ) * (0.5 * step.h);
+    solver_bodies[i].linear_velocity += linear;
+    solver_bodies[i].angular_velocity += angular;
+    solver_bodies[i].linear_start += linear;
+    solver_bodies[i].angular_start += angular;
+}
+
+fn move_one(i: u32) {
+    let before = solver_bodies[i].angular_velocity;
+    integrate_position(i);
+    solver_bodies[i].angular_start += solver_bodies[i].angular_velocity - before;
+    kick_again(i);
+}
+
+// With joints: moves the body; what turning adds to its angular velocity is no load of contacts.
+@compute @workgroup_size(256)
+fn move_body(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i < step.body_count && takes_part(i) {
+        move_one(i);
+    }
+}
+
+// With joints, one pass: moves the body in the last sub-step.
+@compute @workgroup_size(256)
+fn move_last(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i < step.body_count && takes_part(i) {
+        solver_bodies[i].eigenvalue = ease(i);
+        move_one(i);
+    }
+}
+
+// With joints, one pass: starts the next sub-step, as `next_substep`.
+@compute @workgroup_size(256)
+fn start_next(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i >= step.body_count || !takes_part(i) {
+        return;
+    }
+    let linear = solver_bodies[i].linear_velocity - solver_bodies[i].linear_start;
+    let angular = solver_bodies[i].angular_velocity - solver_bodies[i].angular_start;
+    start(i);
+    if solver_bodies[i].inverse_mass > 0.0 {
+        solver_bodies[i].linear_velocity += linear;
+        solver_bodies[i].angular_velocity += angular;
     }
 }
 

@@ -3,7 +3,7 @@
 //
 // Each body remembers a pose and how long no point of its surface has been farther than `sleep_distance` from its place
 // there. An island falls asleep when all its bodies have rested for `sleep_time`, none must stay awake, and nothing
-// kinematic that moves touches it; it wakes as a whole, before anything is solved.
+// kinematic that moves touches it or is joined to it; it wakes as a whole, before anything is solved.
 //
 // After the edits, before the boxes:
 //   begin      one thread a body: nobody has stirred yet. Writes stirs
@@ -11,6 +11,8 @@
 //              rests; writes stirs. Only with edits
 //   beside     one thread a pair of the last step: marks islands that lie beside an edited body. Reads pairs, colliders,
 //              states, rests; writes stirs. Only with edits
+//   pull       one thread a pair of bodies with joints between them: marks islands that one holds which is edited or
+//              moves. Reads joined, work_states, rests; writes stirs. Only with joints
 //   wake       one thread a body: those of marked islands wake. Reads rests; writes work_states, stirs
 // After the narrow phase:
 //   touch      one thread a pair: marks islands that something touches which moves. Reads next_pairs, manifolds, aabbs,
@@ -41,7 +43,7 @@ const NO_ISLAND: u32 = 0xffffffffu;
 // Bits of `stirs`: of a body,
 const STIRRED: u32 = 1u; // edited or woken: its rest begins anew
 const EDITED: u32 = 2u;
-const DRIVEN: u32 = 4u; // something kinematic that moves touches it
+const DRIVEN: u32 = 4u; // something kinematic that moves touches it, or a joint holds it to one
 // and of an island, at the body that is its label.
 const MARKED: u32 = 8u; // it wakes
 const BUSY: u32 = 16u; // it stays awake
@@ -61,6 +63,7 @@ const BUSY: u32 = 16u; // it stays awake
 @group(0) @binding(12) var<storage, read_write> stirs: array<atomic<u32>>;
 @group(0) @binding(13) var<storage, read> edit_records: array<EditRecord>;
 @group(0) @binding(14) var<storage, read> edit_ranges: array<EditRange>;
+@group(0) @binding(15) var<storage, read> joined: array<vec2<u32>>; // their number, then pairs of bodies
 
 var<workgroup> counted: array<atomic<u32>, 4>;
 
@@ -126,6 +129,37 @@ fn beside(
     if ((atomicLoad(&stirs[a]) | atomicLoad(&stirs[b])) & EDITED) != 0u {
         mark(a);
         mark(b);
+    }
+}
+
+@compute @workgroup_size(256)
+fn pull(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i < joined[0].x {
+        let pair = joined[1u + i];
+        pulled(pair.x, pair.y);
+        pulled(pair.y, pair.x);
+    }
+}
+
+// Whether the first body is disturbed by the second, which a joint holds to it.
+fn pulled(body: u32, partner: u32) {
+    let own = work_states[body].flags;
+    if (own & (BODY_KIND | BODY_FROZEN)) != BODY_DYNAMIC {
+        return;
+    }
+    let other = work_states[partner];
+    let driven = drives(other);
+    if driven {
+        atomicOr(&stirs[body], DRIVEN);
+    }
+    let moving = driven || moves(other.flags) || (atomicLoad(&stirs[partner]) & EDITED) != 0u;
+    if moving && is_asleep(own) {
+        atomicOr(&stirs[rests[body].island], MARKED);
     }
 }
 

@@ -16,6 +16,7 @@ const LAYOUTS: &[&str] = &[
     "shared/constraint",
     "shared/control",
     "shared/edit",
+    "shared/joint",
     "shared/level",
     "shared/manifold",
     "shared/pair",
@@ -105,6 +106,24 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             pad_a, batch_start, quarantined, pad_b, islands, islands_open, asleep, islands_asleep,
             awake, manifolds_asleep, levels_wanted, levels_used, visits, residual, bodies_over, pad_c
         }
+        Joint {
+            rotation_a, rotation_b, anchor_a, body_a, anchor_b, body_b, axes, flags, generation, frequency,
+            damping_ratio, break_force, break_torque, pad_a, drives
+        }
+        JointDrive { low, high, target_pos, target_vel, stiffness, damping, max_force, friction }
+        JointState {
+            impulse, tag, torque, broken, remainder, h, angular_remainder, pad_a, separation, angle, pad_b
+        }
+        JointIsland {
+            first_block, block_count, first_level, level_count, first_joint, joint_count, first_body, body_count
+        }
+        JointBlock { row, first_entry, entry_count, first_term, term_count, first_row, row_count, pad_a }
+        JointEntry { row, column, first_term, term_count, shared_bodies, pad_a }
+        JointBody { body, first_end, end_count, direct }
+        JointTables {
+            islands, blocks, levels, entries, terms, rows, joints, bodies, ends, batches, island_count, block_count,
+            entry_count, joint_count, direct_joints, body_count, direct_bodies, batch_count, wide_batches, pad_a
+        }
         EditRecord { op, target, kind, generation, data }
         EditRange { first, count }
         TreeNode { min, child, max, escape }
@@ -142,6 +161,9 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
         body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN, ASLEEP, STAYS_AWAKE, POSED }
         locks as "LOCKED_" { TRANSLATIONS, ROTATIONS, FIRST_ROTATION }
         touched as "TOUCHED_" { CONTACT, JOINED, ANY, FIRST_LOCK }
+        joint_bits as "JOINT_" {
+            LOCKED, DRIVEN, LIMITED, MOTOR, ALIVE, COUPLED, IN_CYCLE, SOFT, APART, FORCE_BASED
+        }
         solver as "SOLVER_" { ONE_PASS, SOFT, GAUSS_SEIDEL, JACOBI, PENALTY }
         shape_kind as "SHAPE_" { NONE, BALL, CUBOID, HALFSPACE }
         aabb_body as "AABB_" { INDEX, FIXED, DYNAMIC, LIVE, ASLEEP }
@@ -158,7 +180,7 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
         batching as "BATCHING_" { WRITE_AND_VERIFY, LOWEST_FREE, PERSISTENT, LAW, STATIC_LAST, SPLIT_LAST }
         ;
         BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT, NO_NODE, NO_COLLIDER,
-        LEVELS, LEVEL_HOLD, LEVEL_CALM, MOST_CREDIT
+        NO_BODY, LEVELS, LEVEL_HOLD, LEVEL_CALM, MOST_CREDIT
     }
 }
 

@@ -1,4 +1,5 @@
-//! Stage `island` alone: labels of islands, on the CPU, on the GPU in every order of invocations, and by a flood fill.
+//! Stage `island` alone: labels of islands over contacts and joints, on the CPU, on the GPU in every order of invocations,
+//! and by a flood fill.
 //! Oracles: the flood fill (analysis) and the mirror; all three must agree exactly.
 
 #[path = "common/alone.rs"]
@@ -28,6 +29,8 @@ struct Graph {
     manifolds: Vec<Manifold>,
     aabbs: Vec<Aabb>,
     ends: Vec<Ends>,
+    /// Bodies with joints between them.
+    joined: Vec<[u32; 2]>,
     control: Control,
     step: StepParams,
 }
@@ -51,7 +54,8 @@ impl Graph {
         let frame = cpu.plan(false);
         let control = control_of(&frame, false);
         let (states, pairs, manifolds) = (frame.states, frame.matched.pairs, frame.manifolds);
-        Self { states, pairs, manifolds, aabbs: frame.aabbs, ends: frame.ends, control, step: frame.step }
+        let (aabbs, ends, joined) = (frame.aabbs, frame.ends, Vec::new());
+        Self { states, pairs, manifolds, aabbs, ends, joined, control, step: frame.step }
     }
 
     /// Bodies that all move but those for which `still` says no, joined by `edges`, which touch.
@@ -71,12 +75,23 @@ impl Graph {
             manifolds: vec![Manifold { count: 1, ..Manifold::zeroed() }; edges.len()],
             aabbs: (0..bodies).map(aabb).collect(),
             ends: edges.iter().map(|&[a, b]| Ends { a: end(a), b: end(b) }).collect(),
+            joined: Vec::new(),
             control: Control { pair_count: edges.len() as u32, ..Control::zeroed() },
             step,
         }
     }
 
-    /// `pairs` random pairs among `bodies` bodies, every tenth of which does not move; a third do not touch.
+    /// The same with a joint for every edge from `first` on, and no contact.
+    fn with_joints(mut self, first: usize) -> Self {
+        self.joined = self.pairs.split_off(first).iter().map(|pair| [pair.a, pair.b]).collect();
+        self.manifolds.truncate(first);
+        self.ends.truncate(first);
+        self.control.pair_count = first as u32;
+        self
+    }
+
+    /// `pairs` random pairs among `bodies` bodies, every tenth of which does not move; of the first half a third do not
+    /// touch, the others are joints.
     fn random(bodies: u32, pairs: u32, seed: u64) -> Self {
         let mut random = Random(seed);
         let edge = |random: &mut Random| {
@@ -86,7 +101,7 @@ impl Graph {
         let edges: Vec<_> = (0..pairs).map(|_| edge(&mut random)).collect();
         let mut graph = Self::joined(bodies, &edges, |body| body % 10 == 9);
         graph.manifolds.iter_mut().for_each(|manifold| manifold.count = random.below(3));
-        graph
+        graph.with_joints(pairs as usize / 2)
     }
 
     fn on_gpu(&self, alone: &mut Alone) -> (Vec<u32>, Control) {
@@ -96,13 +111,20 @@ impl Graph {
         alone.put("next_pairs", &self.pairs);
         alone.put("manifolds", &self.manifolds);
         alone.put("aabbs", &self.aabbs);
+        let mut joined = vec![[self.joined.len() as u32, 0]];
+        joined.extend(&self.joined);
+        // What an earlier, longer list left.
+        joined.extend((!self.states.is_empty()).then(|| [0, self.states.len() as u32 - 1]));
+        alone.put("joined", &joined);
         alone.put("islands", &vec![0xdead_beef_u32; self.states.len()]);
         // A few workgroups too many, as an indirect dispatch may have.
         let groups = |count: usize| (count as u32).div_ceil(256) + 1;
         let (by_pair, by_body) = (groups(self.pairs.len()), groups(self.states.len()));
+        let by_joined = groups(self.joined.len());
         alone.run(|chain| {
             chain.pass("island", "begin", by_body);
             chain.pass("island", "hook", by_pair);
+            chain.pass("island", "hook_joined", by_joined);
             chain.pass("island", "flatten", by_body);
             chain.pass("island", "count", by_body);
         });
@@ -114,6 +136,10 @@ impl Graph {
         let mut neighbours = vec![Vec::new(); self.states.len()];
         for (pair, _) in self.pairs.iter().zip(&self.manifolds).filter(|(_, manifold)| manifold.count > 0) {
             let [a, b] = [pair.a, pair.b].map(|c| self.aabbs[c as usize].body & aabb_body::INDEX);
+            neighbours[a as usize].push(b);
+            neighbours[b as usize].push(a);
+        }
+        for &[a, b] in &self.joined {
             neighbours[a as usize].push(b);
             neighbours[b as usize].push(a);
         }
@@ -132,7 +158,7 @@ impl Graph {
 
     fn check(&self, what: &str, alone: &mut Alone) {
         let expected = self.flood();
-        let cpu = island::label(&self.states, &self.manifolds, &self.ends);
+        let cpu = island::label(&self.states, &self.manifolds, &self.ends, &self.joined);
         assert!(cpu == expected, "{what}: the CPU's labels differ");
         let (gpu, control) = self.on_gpu(alone);
         assert_eq!(control.islands_open, 0, "{what}: turns sufficed");
@@ -197,9 +223,14 @@ fn long_and_wide_graphs_are_one_island_in_any_order() {
     for permute in PERMUTATIONS {
         let mut alone = Alone::new(permute);
         for (name, edges) in &lists {
-            Graph::joined(COUNT, edges, |_| false).check(&format!("{name}, order {permute}"), &mut alone);
+            let all = || Graph::joined(COUNT, edges, |_| false);
+            all().check(&format!("{name}, order {permute}"), &mut alone);
+            all().with_joints(edges.len() / 3).check(&format!("{name}, joints too, order {permute}"), &mut alone);
         }
         // A body that does not move joins nothing.
-        Graph::joined(COUNT, &rising, |body| body == COUNT / 2).check("a chain with a gap", &mut alone);
+        for joints in [rising.len(), 0] {
+            let gap = Graph::joined(COUNT, &rising, |body| body == COUNT / 2).with_joints(joints);
+            gap.check("a chain with a gap", &mut alone);
+        }
     }
 }

@@ -33,7 +33,7 @@ fn check(what: &str, scene: &Scene, levels: u32, tolerance: f32, alone: &mut Alo
         manifold.points.iter_mut().for_each(|point| point.separation = apart);
     }
     let step = StepParams { tolerance, levels, substeps: 4, ..frame.step };
-    let labels = island::label(&states, &manifolds, &frame.ends);
+    let labels = island::label(&states, &manifolds, &frame.ends, &[]);
     let mut control = control_of(&frame, false);
 
     alone.put("step", &[step]);

@@ -1,4 +1,4 @@
-//! Stage `sleep` alone: how long bodies have rested, and which islands fall asleep, on both sides. Oracle: the mirror;
+//! Stage `sleep` alone: how long bodies have rested, which islands fall asleep, and what joints wake, on both sides. Oracle: the mirror;
 //! displacements lie a tenth of the allowance and more off it, so that rounding decides nothing.
 
 #[expect(dead_code, reason = "this program uses a part")]
@@ -21,7 +21,9 @@ use tumble_cpu::sleep;
 
 const SLEEP: Sleep = Sleep { distance: 1e-2, time: 0.5 };
 const STIRRED: u32 = 1;
+const EDITED: u32 = 2;
 const DRIVEN: u32 = 4;
+const MARKED: u32 = 8;
 
 /// Bodies that have strayed by 0 to 0.9 or 1.1 to 5 of the allowance, in islands of neighbours.
 struct Crowd {
@@ -155,4 +157,50 @@ fn the_same_bodies_rest_and_sleep() {
         }
     }
     assert!(seen.iter().all(|&count| count > 300), "a trial that tries nothing: {seen:?}");
+}
+
+#[test]
+fn joints_pull_the_same() {
+    let mut seen = [0; 2];
+    for order in [0, 1, 2] {
+        let mut alone = Alone::new(order);
+        for (seed, bodies) in [2, 255, 256, 257, 3000u32].into_iter().enumerate() {
+            let mut crowd = Crowd::new(bodies as usize, seed as u64 + 40);
+            let mut random = Random::new(seed as u64 + 50);
+            crowd.stirs.iter_mut().for_each(|stirs| *stirs = if random.below(9) == 0 { EDITED } else { 0 });
+            // A few among those that do not move, which wake nobody.
+            let other = |a: u32, random: &mut Random| (a + 1 + random.below(bodies - 1)) % bodies;
+            let joined: Vec<[u32; 2]> = (0..bodies).step_by(3).map(|a| [a, other(a, &mut random)]).collect();
+            alone.put("step", &[crowd.step]);
+            alone.put("work_states", &crowd.states);
+            alone.put("rests", &crowd.rests);
+            alone.put("stirs", &crowd.stirs);
+            let mut listed = vec![[joined.len() as u32, 0]];
+            listed.extend(&joined);
+            // What an earlier list left.
+            listed.extend(&joined);
+            alone.put("joined", &listed);
+            alone.run(|chain| chain.pass("sleep", "pull", bodies.div_ceil(256)));
+
+            let mut expected = crowd.stirs.clone();
+            for (body, partner) in
+                joined.iter().flat_map(|&[a, b]| [(a as usize, b as usize), (b as usize, a as usize)])
+            {
+                let (own, other) = (crowd.states[body].flags, &crowd.states[partner]);
+                if !moves(own & !body_flags::ASLEEP) {
+                    continue;
+                }
+                if sleep::drives(other) {
+                    expected[body] |= DRIVEN;
+                    seen[0] += 1;
+                }
+                if sleep::sleeps(own) && sleep::pulls(other, crowd.stirs[partner] & EDITED != 0) {
+                    expected[crowd.rests[body].island as usize] |= MARKED;
+                    seen[1] += 1;
+                }
+            }
+            assert!(alone.take::<u32>("stirs") == expected, "{bodies} bodies, order {order}");
+        }
+    }
+    assert!(seen[0] > 50 && seen[1] > 50, "{seen:?}");
 }

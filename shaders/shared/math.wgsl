@@ -33,7 +33,7 @@ fn unit(q: vec4<f32>) -> vec4<f32> {
 
 // The turn of a unit quaternion as its axis times its angle, of no more than pi, rad. The tangent of a sixteenth of it is
 // found by halves, and the angle from that by the arc tangent's series: WGSL promises its own to 4,096 last bits only.
-fn rotation_vector(q: vec4<f32>) -> vec3<f32> {
+fn scaled_axis(q: vec4<f32>) -> vec3<f32> {
     let axis = select(q.xyz, -q.xyz, q.w < 0.0);
     let sine = dot(axis, axis);
     // Each scale times the length of `axis` is a tangent: of a quarter, an eighth, a sixteenth of the angle.

@@ -158,7 +158,7 @@ impl Cpu {
             .map(|c| bounds::collider_bounds(c, &states[c.body as usize], &self.props[c.body as usize], &step))
             .collect();
         let found = brute_force::find_pairs(&Boxes::new(&aabbs), u32::MAX);
-        let matched = contact::match_pairs(&self.pairs, &found.pairs, &self.colliders, &self.free, step.step);
+        let matched = contact::match_pairs(&self.pairs, &found.pairs, &self.colliders, &[], &self.free, step.step);
         let collide =
             |pair: &Pair| narrowphase::collide(pair, &self.colliders, &states, &self.found[pair.slot as usize], &step);
         let manifolds: Vec<_> = matched.pairs.iter().map(collide).collect();

@@ -1,7 +1,7 @@
 //! Which joints are solved together, and in what order: built on the host when joints come or go, the same for both sides.
 
 use crate::elimination::Elimination;
-use crate::layout::{Joint, JointBlock, JointBody, JointEntry, JointIsland, NO_BODY, joint_bits};
+use crate::layout::{Joint, JointBlock, JointBody, JointEntry, JointIsland, JointTables, NO_BODY, joint_bits};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How joints are solved.
@@ -22,6 +22,9 @@ pub const MOST_BLOCKS: usize = 1024;
 
 /// Fewest joints of a batch that has a dispatch of its own; the others are solved by one workgroup, batch after batch.
 pub const WIDE_JOINTS: u32 = 256;
+
+/// Most batches that have a dispatch of their own.
+const MOST_WIDE: usize = 64;
 
 /// The joints of a world as its solver visits them. Flat arrays; indices are absolute.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -48,6 +51,8 @@ pub struct Topology {
     pub batches: Vec<u32>,
     /// Pairs of bodies that do not collide, lower slot first, ascending.
     pub apart: Vec<[u32; 2]>,
+    /// Pairs of bodies with a joint between them, broken or not, lower slot first, ascending.
+    pub joined: Vec<[u32; 2]>,
     /// Islands of joints, direct or not.
     pub island_count: u32,
     /// Islands that were to be solved directly, and are too large.
@@ -75,7 +80,8 @@ impl Topology {
         }
         topology.too_large = if solver == JointSolver::GaussSeidel { 0 } else { large.len() as u32 };
         topology.push_batches(joints, &large, moves);
-        topology.apart = apart(joints, &alive);
+        topology.apart = pairs(joints, &alive, joint_bits::APART);
+        topology.joined = pairs(joints, &alive, joint_bits::ALIVE);
         topology
     }
 
@@ -140,13 +146,13 @@ impl Topology {
         }
         for (i, k) in by_column {
             let [first_term, term_count] = push_terms((i, k), &mut self.terms);
-            let shared = shared(joints, row_of(i) / 2, row_of(k) / 2, moves);
+            let shared_bodies = shared(joints, row_of(i) / 2, row_of(k) / 2, moves);
             self.entries.push(JointEntry {
                 row: first_block + i,
                 column: first_block + k,
                 first_term,
                 term_count,
-                shared,
+                shared_bodies,
                 pad_a: [0; 2],
             });
         }
@@ -224,6 +230,40 @@ impl Topology {
     /// Bodies of islands that are solved directly; the others follow.
     pub fn direct_bodies(&self) -> u32 {
         self.islands.last().map_or(0, |island| island.first_body + island.body_count)
+    }
+
+    /// All tables as words, one behind the other, and where each begins.
+    pub fn pack(&self) -> (JointTables, Vec<u32>) {
+        let mut words: Vec<u32> = Vec::new();
+        let mut push = |table: &[u32]| {
+            let first = words.len() as u32;
+            words.extend_from_slice(table);
+            first
+        };
+        let wide = self.batches.windows(2).take_while(|batch| batch[1] - batch[0] >= WIDE_JOINTS);
+        let tables = JointTables {
+            islands: push(bytemuck::cast_slice(&self.islands)),
+            blocks: push(bytemuck::cast_slice(&self.blocks)),
+            levels: push(&self.levels),
+            entries: push(bytemuck::cast_slice(&self.entries)),
+            terms: push(bytemuck::cast_slice(&self.terms)),
+            rows: push(bytemuck::cast_slice(&self.rows)),
+            joints: push(&self.joints),
+            bodies: push(bytemuck::cast_slice(&self.bodies)),
+            ends: push(&self.ends),
+            batches: push(&self.batches),
+            island_count: self.islands.len() as u32,
+            block_count: self.blocks.len() as u32,
+            entry_count: self.entries.len() as u32,
+            joint_count: self.joint_count(),
+            direct_joints: self.direct_joints(),
+            body_count: self.bodies.len() as u32,
+            direct_bodies: self.direct_bodies(),
+            batch_count: self.batches.len().saturating_sub(1) as u32,
+            wide_batches: wide.count().min(MOST_WIDE) as u32,
+            pad_a: 0,
+        };
+        (tables, words)
     }
 
     /// Whether these two bodies are kept from colliding by a joint.
@@ -339,12 +379,12 @@ fn mark_cycles(joints: &mut [Joint], island: &[u32], moves: &impl Fn(u32) -> boo
     }
 }
 
-/// Pairs of bodies that are kept from colliding.
-fn apart(joints: &[Joint], alive: &[u32]) -> Vec<[u32; 2]> {
+/// Pairs of bodies with a joint of this flag between them.
+fn pairs(joints: &[Joint], alive: &[u32], flag: u32) -> Vec<[u32; 2]> {
     let of = |&j: &u32| {
         let joint = &joints[j as usize];
         let pair = [joint.body_a.min(joint.body_b), joint.body_a.max(joint.body_b)];
-        (joint.flags & joint_bits::APART != 0).then_some(pair)
+        (joint.flags & flag != 0).then_some(pair)
     };
     alive.iter().filter_map(of).collect::<BTreeSet<_>>().into_iter().collect()
 }

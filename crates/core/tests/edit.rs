@@ -3,7 +3,7 @@
 use tumble_core::edit::EditBatch;
 use tumble_core::glam::{Quat, Vec3};
 use tumble_core::layout::{BodyProps, Collider, EditRange, EditRecord, body_flags, edit_op, pair_kind, shape_kind};
-use tumble_core::{ColliderBuilder, Editor, Error, Inserted, PackedScene, Pose, RigidBodyBuilder, Scene};
+use tumble_core::{ColliderBuilder, Editor, Error, Inserted, JointSolver, PackedScene, Pose, RigidBodyBuilder, Scene};
 
 /// Four balls, apart.
 fn editor() -> (Editor, [Inserted; 4]) {

@@ -2,7 +2,8 @@
 //!
 //! A pair that stays keeps its slot, with impulses and batch; a new one takes the slot of a pair that went, else one
 //! from the free list. All by rank in sorted lists, so that every run hands out the same slots. A pair stays when it
-//! is in both lists and neither collider was inserted in this step (else its slot number is someone else's).
+//! is in both lists and neither collider was inserted in this step (else its slot number is someone else's). Pairs that
+//! joints keep from colliding are on the list like others, so that all broad phases find the same, but of no kind.
 
 use tumble_core::layout::{Collider, Impulse, Manifold, NO_SLOT, Pair, UNBATCHED, pair_kind, shape_kind};
 
@@ -37,8 +38,21 @@ pub fn kind_of(a: u32, b: u32) -> u32 {
     }
 }
 
-/// Gives each pair of this step a slot. `old` and `found` are sorted by (a, b); `free` is a stack.
-pub fn match_pairs(old: &[Pair], found: &[[u32; 2]], colliders: &[Collider], free: &[u32], step: u32) -> Matched {
+/// Whether joints keep two bodies from colliding; `apart` is [`Topology::apart`](tumble_core::Topology::apart).
+fn are_apart(apart: &[[u32; 2]], a: u32, b: u32) -> bool {
+    !apart.is_empty() && apart.binary_search(&[a.min(b), a.max(b)]).is_ok()
+}
+
+/// Gives each pair of this step a slot, and a kind; that of bodies which do not collide is none. `old` and `found` are
+/// sorted by (a, b); `free` is a stack.
+pub fn match_pairs(
+    old: &[Pair],
+    found: &[[u32; 2]],
+    colliders: &[Collider],
+    apart: &[[u32; 2]],
+    free: &[u32],
+    step: u32,
+) -> Matched {
     let newborn = |a: u32, b: u32| colliders[a as usize].born == step || colliders[b as usize].born == step;
     let mut pairs = Vec::with_capacity(found.len());
     let mut dead_slots = Vec::new();
@@ -49,7 +63,11 @@ pub fn match_pairs(old: &[Pair], found: &[[u32; 2]], colliders: &[Collider], fre
             dead_slots.push(old[next_old].slot);
             next_old += 1;
         }
-        let kind = kind_of(colliders[a as usize].shape, colliders[b as usize].shape);
+        let (one, other) = (&colliders[a as usize], &colliders[b as usize]);
+        let kind = match are_apart(apart, one.body, other.body) {
+            true => pair_kind::NONE,
+            false => kind_of(one.shape, other.shape),
+        };
         let listed = next_old < old.len() && (old[next_old].a, old[next_old].b) == (a, b);
         if listed && !newborn(a, b) {
             pairs.push(Pair { a, b, slot: old[next_old].slot, kind });

@@ -11,10 +11,14 @@ use crate::math::{finite, vec3};
 use crate::query::place;
 use crate::query::shapes::cast;
 use glam::Vec3;
-use tumble_core::layout::{BodyState, Collider, Pair, QueryRay, SolverBody, body_flags, shape_kind};
+use tumble_core::layout::{BodyState, Collider, Pair, QueryRay, SolverBody, body_flags, pair_kind, shape_kind};
 
 /// Which body of the pair must not go all of its way in this step, and the share that it may go.
 pub fn share(pair: &Pair, colliders: &[Collider], states: &[BodyState], bodies: &[SolverBody]) -> Option<(u32, f32)> {
+    if pair.kind & pair_kind::MASK == pair_kind::NONE {
+        // A joint keeps them from colliding.
+        return None;
+    }
     let (a, b) = (&colliders[pair.a as usize], &colliders[pair.b as usize]);
     let (mover, other) = if moves(states[a.body as usize].flags) { (a, b) } else { (b, a) };
     let (state, still) = (&states[mover.body as usize], &states[other.body as usize]);

@@ -5,7 +5,7 @@
 
 use crate::bounds::STATE_LIMIT;
 use crate::math::{
-    finite, free, held_inverse_inertia, quat, rotate, rotate_back, rotation_vector, symmetric_times, vec3,
+    finite, free, held_inverse_inertia, quat, rotate, rotate_back, scaled_axis, symmetric_times, vec3,
 };
 use glam::{Quat, Vec3};
 use tumble_core::layout::{
@@ -97,7 +97,7 @@ fn apply_to_body(record: &EditRecord, step: &StepParams, state: &mut BodyState, 
             let position = a + rotate(own, vec3(props.center_of_mass));
             let turn = (own * quat(props.frame)).normalize() * quat(state.rotation).conjugate();
             state.linear_velocity = ((position - vec3(state.position)) / step.dt).to_array();
-            state.angular_velocity = (rotation_vector(turn) / step.dt).to_array();
+            state.angular_velocity = (scaled_axis(turn) / step.dt).to_array();
         }
         _ => {
             state.flags |= body_flags::FROZEN;

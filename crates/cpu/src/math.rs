@@ -32,7 +32,7 @@ pub(crate) fn rotate_back(q: Quat, v: Vec3) -> Vec3 {
 /// The turn of a unit quaternion as its axis times its angle, of no more than pi, rad. The tangent of a sixteenth of it is
 /// found by halves, and the angle from that by the arc tangent's series: within a few last bits, and the same on every
 /// machine.
-pub(crate) fn rotation_vector(q: Quat) -> Vec3 {
+pub(crate) fn scaled_axis(q: Quat) -> Vec3 {
     let axis = if q.w < 0.0 { -vec3([q.x, q.y, q.z]) } else { vec3([q.x, q.y, q.z]) };
     let sine = axis.dot(axis);
     // Each scale times the length of `axis` is a tangent: of a quarter, an eighth, a sixteenth of the angle.

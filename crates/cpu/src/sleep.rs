@@ -2,7 +2,7 @@
 //!
 //! Each body remembers a pose and how long no point of its surface has been farther than `distance` from its place there;
 //! a body that strays begins anew where it is. An island falls asleep when all its bodies have rested long enough, none
-//! must stay awake, and nothing kinematic that moves touches it.
+//! must stay awake, and nothing kinematic that moves touches it or is joined to it.
 
 use crate::bounds::moves;
 use crate::math::{quat, vec3};
@@ -33,6 +33,11 @@ pub fn rested(rest: &Rest, state: &BodyState, sleep: &Sleep) -> bool {
 pub fn drives(state: &BodyState) -> bool {
     let kinematic = state.flags & (body_flags::KIND | body_flags::FROZEN) == body_flags::KINEMATIC;
     kinematic && (vec3(state.linear_velocity) != glam::Vec3::ZERO || vec3(state.angular_velocity) != glam::Vec3::ZERO)
+}
+
+/// Whether a body disturbs those that joints hold to it.
+pub fn pulls(state: &BodyState, edited: bool) -> bool {
+    edited || moves(state.flags) || drives(state)
 }
 
 /// Whether it sleeps.

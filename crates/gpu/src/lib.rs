@@ -12,6 +12,8 @@ mod contact;
 pub mod device;
 mod edit;
 mod island;
+mod joint;
+mod joined;
 mod level;
 mod motion;
 mod narrowphase;

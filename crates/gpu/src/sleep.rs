@@ -11,6 +11,7 @@ pub(crate) struct Sleep {
     begin: Arc<Pass>,
     edited: Arc<Pass>,
     beside: Arc<Pass>,
+    pull: Arc<Pass>,
     wake: Arc<Pass>,
     touch: Arc<Pass>,
     show: Arc<Pass>,
@@ -25,16 +26,22 @@ pub(crate) struct Sleep {
 impl Sleep {
     pub(crate) fn new(gpu: &Gpu, pipelines: &mut Pipelines, sizes: &Sizes) -> Result<Self> {
         let mut pass = |entry| pipelines.pass(gpu, "sleep", entry);
-        let [begin, edited, beside, wake, touch] =
-            [pass("begin")?, pass("edited")?, pass("beside")?, pass("wake")?, pass("touch")?];
+        let [begin, edited, beside, pull, wake, touch] =
+            [pass("begin")?, pass("edited")?, pass("beside")?, pass("pull")?, pass("wake")?, pass("touch")?];
         let [show, hide, rest, settle, pass_time] =
             [pass("show")?, pass("hide")?, pass("rest")?, pass("settle")?, pass("pass_time")?];
         let args = Args::new(gpu, pipelines, &[Job::new(word::OLD_PAIR_COUNT, sizes.pairs, 256)])?;
-        Ok(Self { begin, edited, beside, wake, touch, show, hide, rest, settle, pass_time, args })
+        Ok(Self { begin, edited, beside, pull, wake, touch, show, hide, rest, settle, pass_time, args })
     }
 
-    /// After the edits: who wakes by them.
-    pub(crate) fn record_edits(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
+    /// After the edits: who wakes by them, or by joints. `joined`: number of pairs of bodies with joints between them.
+    pub(crate) fn record_edits(
+        &self,
+        recorder: &mut Recorder,
+        buffers: &Buffers,
+        step: &StepParams,
+        joined: u32,
+    ) -> Result<()> {
         recorder.stage("sleep");
         let by_body = step.body_count.div_ceil(256);
         recorder.dispatch(&self.begin, &[], by_body)?;
@@ -43,7 +50,8 @@ impl Sleep {
             self.args.record(recorder, buffers.buffer("counters")?)?;
             recorder.dispatch_indirect(&self.beside, &[], self.args.buffer(), 0)?;
         }
-        if step.edit_ranges > 0 || step.wake_all != 0 {
+        recorder.dispatch(&self.pull, &[], joined.div_ceil(256))?;
+        if step.edit_ranges > 0 || step.wake_all != 0 || joined > 0 {
             recorder.dispatch(&self.wake, &[], by_body)?;
         }
         Ok(())

@@ -1,11 +1,12 @@
 //! Stage `solver`: rows, sub-steps, and the way back. Host side of `shaders/solver/`.
 
+use crate::joint::{Joint, Part};
 use crate::split::Split;
 use crate::store::{Sizes, args, index_part, level_part};
 use crate::{Buffers, Gpu, Pass, Pipelines, Recorder};
 use std::sync::Arc;
 use tumble_core::layout::{StepParams, batching, solver};
-use tumble_core::{Plan, Result};
+use tumble_core::{JointSet, Plan, Result};
 
 /// Sweeps of one pass and soft, and those that others share.
 const PASSES: &str = "solver/passes";
@@ -61,6 +62,8 @@ pub(crate) struct Solver {
     law: Law,
     restitution: Option<Sweep>,
     store: Arc<Pass>,
+    /// Where bodies are joined.
+    joints: Option<Joint>,
 }
 
 impl Sweep {
@@ -142,7 +145,13 @@ impl Law {
         })
     }
 
-    fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
+    fn record(
+        &self,
+        recorder: &mut Recorder,
+        buffers: &Buffers,
+        step: &StepParams,
+        joints: Option<&Joint>,
+    ) -> Result<()> {
         match self {
             Self::OnePass { first, load, .. } => {
                 first.record(recorder, buffers, step)?;
@@ -151,50 +160,72 @@ impl Law {
             Self::Jacobi { split, .. } => split.record(recorder, buffers, step)?,
             _ => {}
         }
-        (1..=step.substeps).try_for_each(|substep| self.record_substep(recorder, buffers, step, substep))
+        (1..=step.substeps).try_for_each(|substep| self.record_substep(recorder, buffers, step, joints, substep))
     }
 
+    /// Joints come before contacts, and once more when bodies have moved.
     fn record_substep(
         &self,
         recorder: &mut Recorder,
         buffers: &Buffers,
         step: &StepParams,
+        joints: Option<&Joint>,
         substep: u32,
     ) -> Result<()> {
+        let solve = |recorder: &mut Recorder| match joints {
+            Some(joints) => joints.record(recorder, buffers, step, Part::Solve),
+            None => Ok(()),
+        };
+        let move_bodies = |recorder: &mut Recorder, positions: &ByBody| match joints {
+            Some(joints) => joints.record_move(recorder, buffers, step, false),
+            None => positions.record(recorder, buffers, step),
+        };
         match self {
             Self::OnePass { pass, next, last, .. } => {
+                solve(recorder)?;
                 pass.record(recorder, buffers, step)?;
-                if substep < step.substeps { next } else { last }.record(recorder, buffers, step)
+                let is_last = substep == step.substeps;
+                match joints {
+                    None => if is_last { last } else { next }.record(recorder, buffers, step),
+                    Some(joints) => {
+                        joints.record_move(recorder, buffers, step, is_last)?;
+                        if is_last { Ok(()) } else { joints.record_next(recorder, buffers, step) }
+                    }
+                }
             }
-            Self::Soft { start, solve, positions, relax } => {
+            Self::Soft { start, solve: springs, positions, relax } => {
                 start.record(recorder, buffers, step)?;
-                solve.record(recorder, buffers, step)?;
-                positions.record(recorder, buffers, step)?;
+                solve(recorder)?;
+                springs.record(recorder, buffers, step)?;
+                move_bodies(recorder, positions)?;
                 relax.record(recorder, buffers, step)
             }
             Self::GaussSeidel { start, visit, last, positions } => {
                 start.record(recorder, buffers, step)?;
+                solve(recorder)?;
                 for _ in 1..step.iterations {
                     visit.record(recorder, buffers, step)?;
                 }
                 last.record(recorder, buffers, step)?;
-                positions.record(recorder, buffers, step)
+                move_bodies(recorder, positions)
             }
             Self::Jacobi { start, begin, visit, last, settle, positions, .. } => {
                 start.record(recorder, buffers, step)?;
+                solve(recorder)?;
                 begin.record(recorder, buffers, step)?;
                 for iteration in 1..=step.iterations {
                     let visit = if iteration < step.iterations { visit } else { last };
                     visit.record(recorder, buffers, step)?;
                     settle.record(recorder, buffers, step)?;
                 }
-                positions.record(recorder, buffers, step)
+                move_bodies(recorder, positions)
             }
             Self::Penalty { first, press, settle, positions } => {
                 first.record(recorder, buffers, step)?;
+                solve(recorder)?;
                 press.record(recorder, buffers, step)?;
                 settle.record(recorder, buffers, step)?;
-                positions.record(recorder, buffers, step)
+                move_bodies(recorder, positions)
             }
         }
     }
@@ -222,6 +253,7 @@ impl Solver {
             law: Law::new(gpu, pipelines, plan, law)?,
             restitution,
             store: pipelines.pass(gpu, "solver/store", "store")?,
+            joints: plan.joints.then(|| Joint::new(gpu, pipelines)).transpose()?,
         })
     }
 
@@ -230,10 +262,24 @@ impl Solver {
         self.split.as_ref().map_or(0, Split::bytes)
     }
 
+    /// Tells the solver which joints the step has that is recorded next.
+    pub(crate) fn prepare(&mut self, joints: &Arc<JointSet>) {
+        if let Some(own) = &mut self.joints {
+            own.prepare(joints);
+        }
+    }
+
+    fn joints(&self) -> Option<&Joint> {
+        self.joints.as_ref().filter(|joints| joints.any())
+    }
+
     pub(crate) fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
         recorder.stage("prepare");
         let own = buffers.buffer("dispatch_args")?;
         recorder.dispatch(&self.bodies, &[], by_body(step))?;
+        if let Some(joints) = self.joints() {
+            joints.record_mark(recorder)?;
+        }
         if let Some(split) = self.split.as_ref().filter(|_| splits_last(step)) {
             split.record(recorder, buffers)?;
         }
@@ -243,6 +289,9 @@ impl Solver {
         for step in step.by_level() {
             self.record_level(recorder, buffers, &step)?;
         }
+        if let Some(joints) = self.joints() {
+            joints.record_store(recorder)?;
+        }
         recorder.dispatch_indirect(&self.store, &[], own, args::CONSTRAINTS)
     }
 
@@ -251,7 +300,10 @@ impl Solver {
         if let Some(rewind) = self.rewind.as_ref().filter(|_| step.levels.trailing_zeros() < step.level) {
             rewind.record(recorder, buffers, step)?;
         }
-        self.law.record(recorder, buffers, step)?;
+        if let Some(joints) = self.joints() {
+            joints.record(recorder, buffers, step, Part::Begin)?;
+        }
+        self.law.record(recorder, buffers, step, self.joints())?;
         self.restitution.as_ref().map_or(Ok(()), |restitution| restitution.record(recorder, buffers, step))
     }
 }

@@ -13,9 +13,9 @@ use crate::sleep::Sleep;
 use crate::solver::Solver;
 use crate::store::Sizes;
 use crate::{Buffers, Gpu, Pipelines, Recorder};
-use tumble_core::edit::Stale;
+use tumble_core::edit::EditBatch;
 use tumble_core::layout::StepParams;
-use tumble_core::{Plan, Result};
+use tumble_core::{JointSet, Plan, Result};
 
 /// What decides which passes there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,17 +68,25 @@ impl Stages {
     }
 
     /// Tells stages what they must know on the host before the step is submitted.
-    pub(crate) fn prepare(&mut self, gpu: &Gpu, step: &StepParams, stale: Stale) -> Result<()> {
-        self.broadphase.prepare(gpu, step, stale)
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, step: &StepParams, edits: &EditBatch) -> Result<()> {
+        self.solver.prepare(&edits.joints);
+        self.broadphase.prepare(gpu, step, edits.stale)
     }
 
     /// Records one step: the plan phase up to the second gate, then the commit phase, whose passes do nothing once the
     /// stop flag is up.
-    pub(crate) fn record(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
+    pub(crate) fn record(
+        &self,
+        recorder: &mut Recorder,
+        buffers: &Buffers,
+        step: &StepParams,
+        joints: &JointSet,
+    ) -> Result<()> {
         let may_sleep = step.sleep_distance >= 0.0;
+        let joined = joints.topology.joined.len() as u32;
         self.edit.record(recorder, step)?;
         if let Some(sleep) = self.sleep.as_ref().filter(|_| may_sleep || step.wake_all != 0) {
-            sleep.record_edits(recorder, buffers, step)?;
+            sleep.record_edits(recorder, buffers, step, joined)?;
         }
         self.bounds.record(recorder, step)?;
         self.broadphase.record(recorder, buffers, step)?;
@@ -89,7 +97,7 @@ impl Stages {
         }
         let leveled = step.is_leveled();
         if let Some(island) = self.island.as_ref().filter(|_| may_sleep || leveled) {
-            island.record(recorder, step, self.contact.a_pair())?;
+            island.record(recorder, step, self.contact.a_pair(), joined)?;
         }
         if let Some(level) = self.level.as_ref().filter(|_| leveled) {
             level.record(recorder, step, self.contact.a_pair())?;

@@ -153,11 +153,14 @@ pub(crate) fn create(gpu: &Gpu, packed: &PackedScene, sizes: &Sizes, edits: u32)
     buffers.create(gpu, "step", size_of::<StepParams>() as u64, 1, uniform)?;
     buffers.create(gpu, "level_steps", 256, LEVELS.into(), uniform)?;
     buffers.create(gpu, "part_count", 4, 1, storage)?;
+    buffers.create(gpu, "apart", 8, 1, storage)?;
+    buffers.create(gpu, "joined", 8, 1, storage)?;
     buffers.create(gpu, "class_histogram", 4, 1024, storage)?;
     buffers.create(gpu, "dispatch_args", 16, args::COUNT, storage | BufferUsages::INDIRECT)?;
     buffers.create(gpu, "edit_records", size_of::<EditRecord>() as u64, edits.into(), storage)?;
     buffers.create(gpu, "edit_ranges", size_of::<EditRange>() as u64, edits.into(), storage)?;
     buffers.create(gpu, "indices", 256, 64, uniform)?;
+    crate::joint::create(gpu, &mut buffers)?;
     let indices: Vec<u32> = (0..64 * 64).map(|i| if i % 64 == 0 { i / 64 } else { 0 }).collect();
     let write = |name: &str, bytes: &[u8]| -> Result<()> {
         gpu.queue.write_buffer(buffers.buffer(name)?, 0, bytes);

@@ -170,7 +170,7 @@ pub struct JointEntry {
     /// Number of terms.
     pub term_count: u32,
     /// Bodies that move and that both joints hold, [`NO_BODY`] where there is none.
-    pub shared: [u32; 2],
+    pub shared_bodies: [u32; 2],
     /// Unused.
     pub pad_a: [u32; 2],
 }
@@ -187,4 +187,51 @@ pub struct JointBody {
     pub end_count: u32,
     /// 1 where they are solved directly.
     pub direct: u32,
+}
+
+/// Where in the words of [`Topology::pack`](crate::Topology::pack) each table begins, and how many elements some have. 80
+/// bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct JointTables {
+    /// First word of the islands.
+    pub islands: u32,
+    /// First word of the blocks.
+    pub blocks: u32,
+    /// First word of the levels.
+    pub levels: u32,
+    /// First word of the entries.
+    pub entries: u32,
+    /// First word of the terms.
+    pub terms: u32,
+    /// First word of the rows.
+    pub rows: u32,
+    /// First word of the joints' slots.
+    pub joints: u32,
+    /// First word of the bodies.
+    pub bodies: u32,
+    /// First word of the ends.
+    pub ends: u32,
+    /// First word of the batches.
+    pub batches: u32,
+    /// Number of islands.
+    pub island_count: u32,
+    /// Number of blocks.
+    pub block_count: u32,
+    /// Number of entries.
+    pub entry_count: u32,
+    /// Number of joints.
+    pub joint_count: u32,
+    /// Joints that are solved directly, the first ones.
+    pub direct_joints: u32,
+    /// Number of bodies.
+    pub body_count: u32,
+    /// Bodies of joints that are solved directly, the first ones.
+    pub direct_bodies: u32,
+    /// Number of batches.
+    pub batch_count: u32,
+    /// Batches that have a dispatch of their own, the first ones.
+    pub wide_batches: u32,
+    /// Unused.
+    pub pad_a: u32,
 }

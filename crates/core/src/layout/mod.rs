@@ -20,7 +20,9 @@ pub use collider::{Aabb, Collider, aabb_body, shape_kind};
 pub use constraint::{ConstraintHead, ConstraintPoint, Impulse, ManifoldMemory, tangents};
 pub use control::{BATCHES, Control, LAST_BATCH, QUARANTINE_NAMES, UNBATCHED, overflow};
 pub use edit::{EditRange, EditRecord, edit_op};
-pub use joint::{Joint, JointBlock, JointBody, JointDrive, JointEntry, JointIsland, JointState, NO_BODY, joint_bits};
+pub use joint::{
+    Joint, JointBlock, JointBody, JointDrive, JointEntry, JointIsland, JointState, JointTables, NO_BODY, joint_bits,
+};
 pub use level::{LEVEL_CALM, LEVEL_HOLD, LEVELS, MOST_CREDIT};
 pub use manifold::{FoundManifold, Manifold, ManifoldPoint, NO_SLOT, Pair, pair_kind};
 pub use query::{NO_COLLIDER, PlacedShape, QueryAnswer, QueryInfo, QueryPoint, QueryRay, QueryVolume, query_word};

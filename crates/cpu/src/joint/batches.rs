@@ -78,6 +78,10 @@ impl Loose {
     ) -> (Self, JointState) {
         let joint = &scene.set.joints[slot as usize];
         let slots = [joint.body_a, joint.body_b];
+        let own = Self { bodies: slots, ..Self::default() };
+        if level(&own, bodies).is_none() {
+            return (own, state);
+        }
         let mut work = Work::new(slot, joint, state, between(scene, slots), step.h);
         let [a, b] = slots.map(|slot| Body::of(&bodies.get(slot as usize), &scene.states[slot as usize]));
         work.refresh(joint, &a, &b);
@@ -199,10 +203,10 @@ impl Loose {
     }
 }
 
-/// The level of sub-steps of a joint.
-pub fn level(loose: &Loose, bodies: &impl Store) -> u32 {
-    let [a, b] = loose.bodies.map(|slot| bodies.get(slot as usize));
-    if a.inverse_mass > 0.0 { a.level } else { b.level }
+/// The level of sub-steps of a joint; none where both its bodies sleep or stand still.
+pub fn level(loose: &Loose, bodies: &impl Store) -> Option<u32> {
+    let ends = loose.bodies.map(|slot| bodies.get(slot as usize));
+    ends.into_iter().find(|body| body.inverse_mass > 0.0).map(|body| body.level)
 }
 
 /// From the first centre of mass to the second one when the step began, m.

@@ -276,7 +276,7 @@ impl Island {
         let first = slots.map(|slot| scene.set.joints[slot].body_a);
         let (row, column) = (&self.works[i].blocks[row], &self.works[j].blocks[column]);
         let mut value = Mat3::ZERO;
-        for slot in entry.shared.into_iter().filter(|&slot| slot != NO_BODY) {
+        for slot in entry.shared_bodies.into_iter().filter(|&slot| slot != NO_BODY) {
             let (turn, turn_sign) = if first[0] == slot { (row.turn_a, -1.0) } else { (row.turn_b, 1.0) };
             let (response, sign) = if first[1] == slot { (column.response_a, -1.0) } else { (column.response_b, 1.0) };
             let index = self.ends[i][usize::from(first[0] != slot)];

@@ -11,6 +11,7 @@ pub mod frame;
 pub mod island;
 pub mod rows;
 
+use crate::bounds::moves;
 use crate::math::{finite, vec3};
 use crate::shared::Shared;
 use batches::Loose;
@@ -20,7 +21,7 @@ use rows::Body;
 use std::ops::Range;
 use std::sync::Mutex;
 use tumble_core::JointSet;
-use tumble_core::layout::{BodyProps, BodyState, JointState, SolverBody, StepParams, touched};
+use tumble_core::layout::{BodyProps, BodyState, JointIsland, JointState, SolverBody, StepParams, touched};
 
 /// A part of a sub-step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,14 +116,14 @@ impl Joints {
         let first = set.topology.direct_joints() as usize;
         let store = Shared::new(bodies);
         for (place, (loose, state)) in self.loose.iter().zip(&self.loose_states).enumerate() {
-            if batches::level(loose, &store) == step.level {
+            if batches::level(loose, &store) == Some(step.level) {
                 let slot = set.topology.joints[first + place];
                 let scene = Scene { set, states, props: &[] };
                 self.states[slot as usize] = kept(loose.lasting(&scene, slot, *state, &store, step));
             }
         }
         for (info, island) in set.topology.islands.iter().zip(&mut self.islands) {
-            if bodies[set.topology.bodies[info.first_body as usize].body as usize].level != step.level {
+            if level(set, info, states, |slot| bodies[slot].level) != Some(step.level) {
                 continue;
             }
             let island = island.get_mut().expect("no thread panicked with it");
@@ -170,7 +171,7 @@ impl Running<'_> {
                     if part == Part::BeginLoose {
                         let state_of = self.states[slot as usize];
                         (*loose, *state) = Loose::begin(&self.scene, slot, state_of, bodies, step);
-                    } else if batches::level(loose, bodies) == step.level {
+                    } else if batches::level(loose, bodies) == Some(step.level) {
                         self.visit(part, slot, loose, state, bodies, step);
                     }
                 }
@@ -216,8 +217,8 @@ impl Running<'_> {
 
     fn run_island(&self, part: Part, index: usize, bodies: &Shared<'_, SolverBody>, step: &StepParams) {
         let info = &self.scene.set.topology.islands[index];
-        let first = self.scene.set.topology.bodies[info.first_body as usize].body;
-        if Store::get(bodies, first as usize).level != step.level {
+        let level = level(self.scene.set, info, self.scene.states, |slot| Store::get(bodies, slot).level);
+        if level != Some(step.level) {
             return;
         }
         let mut island = self.islands[index].lock().expect("no thread panicked with it");
@@ -235,4 +236,12 @@ pub fn mark(set: &JointSet, bodies: &mut [SolverBody]) {
         let bit = if body.direct != 0 { touched::JOINED } else { touched::CONTACT };
         bodies[body.body as usize].touched |= bit;
     }
+}
+
+/// The level of sub-steps of an island that is solved directly, by that of each body; none where all its bodies sleep or
+/// are in quarantine: nothing is solved then, and what its joints remember stays.
+fn level(set: &JointSet, info: &JointIsland, states: &[BodyState], of: impl Fn(usize) -> u32) -> Option<u32> {
+    let bodies = &set.topology.bodies[info.first_body as usize..][..info.body_count as usize];
+    let awake = bodies.iter().map(|body| body.body as usize).find(|&slot| moves(states[slot].flags));
+    awake.map(of)
 }

@@ -11,7 +11,7 @@ use crate::bounds::{self, NOWHERE, moves};
 use crate::broadphase::lbvh::Tree;
 use crate::broadphase::{Boxes, Found, collect};
 use crate::island::{self, NO_ISLAND};
-use crate::sleep::{self, drives, sleeps};
+use crate::sleep::{self, drives, pulls, sleeps};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 use tumble_core::edit::EditBatch;
@@ -100,6 +100,8 @@ pub(super) struct Outcome<'a> {
     pub(super) labels: Vec<u32>,
     pub(super) manifolds: &'a [Manifold],
     pub(super) ends: &'a [Ends],
+    /// Pairs of bodies with joints between them.
+    pub(super) joined: &'a [[u32; 2]],
     pub(super) waking: Waking,
 }
 
@@ -168,8 +170,8 @@ impl Kept {
         self.asleep.sums.add_to(&mut self.control);
     }
 
-    /// Who wakes before the step looks at anything: whose body is edited, or lies beside one that is; or all. `states` are
-    /// edited. With them come the pairs that they had.
+    /// Who wakes before the step looks at anything: whose body is edited, or lies beside one that is, or is joined to one
+    /// that is or moves; or all. `states` are edited. With them come the pairs that they had.
     pub(super) fn wake_by_edits(
         &self,
         edits: &EditBatch,
@@ -184,7 +186,8 @@ impl Kept {
             bodies.for_each(|record| waking.edited[record.target as usize] = true);
         }
         let all = !may_sleep || asleep.told != told(step);
-        if asleep.bodies == 0 || (!all && waking.edited.is_empty()) {
+        let joined = &edits.joints.topology.joined;
+        if asleep.bodies == 0 || (!all && waking.edited.is_empty() && joined.is_empty()) {
             return (waking, Vec::new());
         }
         let mut marked = vec![all; states.len()];
@@ -195,6 +198,13 @@ impl Kept {
             }
         };
         (0..waking.edited.len() as u32).filter(|&body| waking.is_edited(body)).for_each(&mut mark);
+        for &[a, b] in joined {
+            for (body, partner) in [(a, b), (b, a)] {
+                if pulls(&states[partner as usize], waking.is_edited(partner)) {
+                    mark(body);
+                }
+            }
+        }
         let mut beside = false;
         for pair in asleep.pairs.iter().filter(|_| !waking.edited.is_empty()) {
             let [a, b] = [pair.a, pair.b].map(|collider| self.colliders[collider as usize].body);
@@ -283,10 +293,11 @@ impl Kept {
         states: &[BodyState],
         manifolds: &[Manifold],
         ends: &[Ends],
+        joined: &[[u32; 2]],
         step: &StepParams,
     ) -> Vec<u32> {
         match may_sleep(step).is_some() || step.is_leveled() {
-            true => island::label(states, manifolds, ends),
+            true => island::label(states, manifolds, ends, joined),
             false => Vec::new(),
         }
     }
@@ -294,7 +305,7 @@ impl Kept {
     /// Looks who has rested long enough, and puts whole islands to sleep. `self.states` are those after the step, and
     /// `self.pairs` all that were looked at.
     pub(super) fn settle(&mut self, outcome: Outcome, step: &StepParams, control: &mut Control) {
-        let Outcome { labels, manifolds, ends, waking } = outcome;
+        let Outcome { ref labels, ref waking, .. } = outcome;
         let woken = waking.any();
         let asleep = &mut self.asleep;
         if let Some(still) = waking.still.as_ref() {
@@ -318,7 +329,7 @@ impl Kept {
                 *rest = if anew { sleep::begin(state) } else { sleep::rest(rest, state, props, sleep, step.dt) };
             },
         );
-        let busy = self.busy(&labels, manifolds, ends, sleep);
+        let busy = self.busy(&outcome, sleep);
         let mut slept = false;
         for (slot, &label) in labels.iter().enumerate().filter(|(_, label)| **label != NO_ISLAND) {
             if !busy[label as usize] {
@@ -342,7 +353,8 @@ impl Kept {
     }
 
     /// By label, whether something keeps the island awake.
-    fn busy(&self, labels: &[u32], manifolds: &[Manifold], ends: &[Ends], sleep: &Sleep) -> Vec<bool> {
+    fn busy(&self, outcome: &Outcome, sleep: &Sleep) -> Vec<bool> {
+        let Outcome { labels, manifolds, ends, joined, .. } = outcome;
         let mut busy = vec![false; labels.len()];
         for ((&label, state), rest) in labels.iter().zip(&self.states).zip(&self.asleep.rests) {
             if label != NO_ISLAND && !sleep::rested(rest, state, sleep) {
@@ -350,11 +362,18 @@ impl Kept {
             }
         }
         let driven = self.states.iter().any(drives);
-        for ((pair, ends), _) in self.pairs.iter().zip(ends).zip(manifolds).filter(|(_, m)| driven && m.count > 0) {
+        for ((pair, ends), _) in self.pairs.iter().zip(*ends).zip(*manifolds).filter(|(_, m)| driven && m.count > 0) {
             let drives = |collider: u32| drives(&self.states[self.colliders[collider as usize].body as usize]);
             if drives(pair.a) || drives(pair.b) {
                 for label in [ends.a, ends.b].iter().filter_map(|&body| labels.get(body as usize)) {
                     busy[*label as usize] = true;
+                }
+            }
+        }
+        for &[a, b] in joined.iter().filter(|_| driven) {
+            for (body, partner) in [(a, b), (b, a)] {
+                if labels[body as usize] != NO_ISLAND && drives(&self.states[partner as usize]) {
+                    busy[labels[body as usize] as usize] = true;
                 }
             }
         }

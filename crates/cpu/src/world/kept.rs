@@ -144,7 +144,8 @@ impl Kept {
             return over("pairs", with_asleep, step.pair_capacity);
         }
         let old = if woken.is_empty() { Cow::from(&self.pairs) } else { asleep::merged(&self.pairs, &woken).into() };
-        let mut matched = contact::match_pairs(&old, &found.pairs, &self.colliders, &self.free, step.step);
+        let apart = &edits.joints.topology.apart;
+        let mut matched = contact::match_pairs(&old, &found.pairs, &self.colliders, apart, &self.free, step.step);
         control.new_count = matched.new_count;
         control.dead_count = matched.dead_slots.len() as u32;
         let run = watch.next(run, "narrowphase");
@@ -227,7 +228,7 @@ impl Kept {
         let run = watch.begin("prepare");
         let Planned { mut states, matched, manifolds, batches, mut control, ends, waking, joints } = planned;
         self.joints.reserve(&joints);
-        let labels = self.labels(&states, &manifolds, &ends, step);
+        let labels = self.labels(&states, &manifolds, &ends, &joints.topology.joined, step);
         control.islands = island::count(&labels);
         if step.is_leveled() {
             level::decide(&mut states, &self.props, &labels, &manifolds, &ends, step, &mut control);
@@ -285,7 +286,8 @@ impl Kept {
         bad.collect::<Vec<_>>().into_iter().for_each(|slot| name(&mut control, slot));
         self.states = states;
         self.pairs = matched.pairs;
-        let outcome = Outcome { labels, manifolds: &manifolds, ends: &ends, waking };
+        let joined = &joints.topology.joined;
+        let outcome = Outcome { labels, manifolds: &manifolds, ends: &ends, joined, waking };
         self.settle(outcome, step, &mut control);
         control.frozen_count = self
             .states

@@ -5,6 +5,8 @@ mod queries;
 mod results;
 
 use crate::broadphase::Choice;
+use crate::joint;
+use crate::joined::Joined;
 use crate::query::Query;
 use crate::readback::{Readback, read_now};
 use crate::stages::{Built, Stages};
@@ -14,11 +16,12 @@ use bytemuck::Zeroable;
 use glam::Vec3;
 use growth::within;
 use std::collections::VecDeque;
+use std::sync::Arc;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{Control, LAST_BATCH, Pair, PoseRecord, StepParams};
 use tumble_core::limits::{self, Room};
 use tumble_core::stopwatch::{Span, Stopwatch};
-use tumble_core::{Editor, Params, Poses, Result, Scene, StageRun, StageTime, StepReport, WantedLevels};
+use tumble_core::{Editor, JointSet, Params, Poses, Result, Scene, StageRun, StageTime, StepReport, WantedLevels};
 
 /// Steps in flight before `step` waits.
 const IN_FLIGHT: usize = 3;
@@ -40,6 +43,7 @@ pub struct World {
     buffers: Buffers,
     stages: Stages,
     sizes: Sizes,
+    joined: Joined,
     /// Records that the buffers of edits have room for.
     edit_room: u32,
     built: Built,
@@ -78,6 +82,8 @@ pub struct World {
     watch: Stopwatch,
     growths: Vec<(&'static str, u32)>,
     drop_pair: u32,
+    /// The joints that are in the buffers.
+    uploaded: Arc<JointSet>,
     /// From the first query on.
     query: Option<Query>,
 }
@@ -163,6 +169,7 @@ impl World {
             watch: Stopwatch::default(),
             growths: Vec::new(),
             drop_pair: u32::MAX,
+            uploaded: Arc::default(),
             built,
             query: None,
             cache: BindCache::new(),
@@ -173,6 +180,7 @@ impl World {
             buffers,
             stages,
             sizes,
+            joined: Joined::default(),
             edit_room: room.edits,
             timer,
         })
@@ -344,14 +352,14 @@ impl World {
         let run = self.watch.begin("upload");
         self.upload(&record)?;
         if !record.idle {
-            self.stages.prepare(&self.gpu, &record.step, record.edits.stale)?;
+            self.stages.prepare(&self.gpu, &record.step, &record.edits)?;
         }
         let run = self.watch.next(run, "record");
         let timer = if self.params.profile { self.timer.as_mut() } else { None };
         let mut recorder = Recorder::new(&self.gpu, &self.buffers, &mut self.cache, timer);
         match record.idle {
             true => self.stages.record_idle(&mut recorder)?,
-            false => self.stages.record(&mut recorder, &self.buffers, &record.step)?,
+            false => self.stages.record(&mut recorder, &self.buffers, &record.step, &record.edits.joints)?,
         }
         self.statuses.copy(recorder.encoder(), self.buffers.buffer("control")?, 0);
         self.dispatches = recorder.dispatches();
@@ -365,11 +373,17 @@ impl World {
 
     fn upload(&mut self, record: &Record) -> Result<()> {
         let edits = &record.edits;
+        self.joined.upload(&self.gpu, &mut self.buffers, &edits.joints.topology)?;
         let queue = &self.gpu.queue;
         queue.write_buffer(self.buffers.buffer("step")?, 0, bytemuck::bytes_of(&record.step));
         for step in record.step.by_level() {
             queue.write_buffer(self.buffers.buffer("level_steps")?, level_offset(&step), bytemuck::bytes_of(&step));
         }
+        if !Arc::ptr_eq(&self.uploaded, &edits.joints) {
+            joint::upload(&self.gpu, &mut self.buffers, &edits.joints)?;
+            self.uploaded = edits.joints.clone();
+        }
+        let queue = &self.gpu.queue;
         queue.write_buffer(self.buffers.buffer("edit_records")?, 0, bytemuck::cast_slice(&edits.records));
         queue.write_buffer(self.buffers.buffer("edit_ranges")?, 0, bytemuck::cast_slice(&edits.ranges));
         Ok(())
