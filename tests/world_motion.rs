@@ -56,7 +56,7 @@ fn targets() -> Vec<Pose> {
         at(Vec3::new(-7.0, 12.0, 9.0), 3.5, axis),
         at(Vec3::new(-3.0, 29.0, 5.0), -2.0, Vec3::X),
         // Half a turn about another axis: one way round is as good as the other.
-        Pose { translation: Vec3::new(3.0, 11.0, 5.0), rotation: Quat::from_rotation_z(3.141_592_7) },
+        Pose { translation: Vec3::new(3.0, 11.0, 5.0), rotation: Quat::from_rotation_z(PI as f32) },
         at(Vec3::new(3.0, 11.0, 5.0), 0.0, Vec3::Y),
     ]
 }
