@@ -35,6 +35,9 @@ fn make_rows(place: u32) {
         rebuild(place);
     }
     for (var which = 0u; which < 2u; which++) {
+        if rows_in_use(joint_works[place].axes, which) == 0u {
+            continue;
+        }
         joint_works[place].rows[which].mass = inverse3(diagonal_block(place, which));
     }
 }

@@ -183,10 +183,6 @@ fn look(place: u32) {
     joint_works[place].turned = now.about.coordinates;
 }
 
-fn rows_in_use(axes: u32, which: u32) -> u32 {
-    return ((axes >> (JOINT_LOCKED + 3u * which)) | (axes >> (JOINT_DRIVEN + 3u * which))) & 7u;
-}
-
 // The rows that are active, from the axes.
 fn rebuild(place: u32) {
     let ia = joint_works[place].body_a;
@@ -194,6 +190,9 @@ fn rebuild(place: u32) {
     let masses = solver_bodies[ia].inverse_mass + solver_bodies[ib].inverse_mass;
     for (var which = 0u; which < 2u; which++) {
         let used = rows_in_use(joint_works[place].axes, which);
+        if used == 0u {
+            continue;
+        }
         var own: vec3<f32>;
         for (var row = 0u; row < 3u; row++) {
             var axis = vec3<f32>();
@@ -317,6 +316,9 @@ fn predict(place: u32) {
     let spin = h * fastest / THETA;
     let still = 1.0 / (1.0 + spin * spin * spin * spin);
     for (var which = 0u; which < 2u; which++) {
+        if rows_in_use(joint_works[place].axes, which) == 0u {
+            continue;
+        }
         var change = next.along.coordinates - joint_works[place].shift;
         var before = joint_states[slot].remainder;
         if which == 1u {
@@ -372,6 +374,9 @@ fn keep_impulses(place: u32) {
 // What rows of a fixed impulse are still to give; others give nothing.
 fn fix(place: u32) {
     for (var which = 0u; which < 2u; which++) {
+        if rows_in_use(joint_works[place].axes, which) == 0u {
+            continue;
+        }
         let fixed = joint_works[place].rows[which].kinds == vec3<u32>(PIECE_FIXED);
         let more = joint_works[place].rows[which].goal - joint_works[place].rows[which].impulse;
         let push = select(vec3<f32>(), more, fixed);
@@ -391,6 +396,9 @@ fn push_of(end: u32) -> Push {
     let place = end >> 1u;
     var push: Push;
     for (var which = 0u; which < 2u; which++) {
+        if rows_in_use(joint_works[place].axes, which) == 0u {
+            continue;
+        }
         let given = joint_works[place].rows[which].push;
         push.linear += joint_works[place].rows[which].along * given;
         if (end & 1u) == 1u {

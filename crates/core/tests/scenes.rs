@@ -35,7 +35,15 @@ fn every_standard_scene_has_the_bodies_asked_for() {
                 let base = (0..).take_while(|b| b * (b + 1) / 2 <= bodies).last().unwrap();
                 assert_eq!(found, base * (base + 1) / 2);
             } else {
-                assert_eq!(found, bodies, "{}", standard.name);
+                // Nets are square, and of the others no half is built.
+                let most = match standard.name {
+                    "net" | "joint_grid" => bodies.isqrt().pow(2),
+                    "ragdolls" => bodies / scenes::RAGDOLL_BODIES * scenes::RAGDOLL_BODIES,
+                    "four_bars" => bodies / 3 * 3,
+                    "cars" => bodies / scenes::CAR_BODIES * scenes::CAR_BODIES,
+                    _ => bodies,
+                };
+                assert_eq!(found, most, "{}", standard.name);
             }
             assert!(overlap(&scene) <= 1e-6, "{} of {bodies}: {:e} m", standard.name, overlap(&scene));
         }

@@ -23,6 +23,7 @@ fn back(v: Vec3) -> glam::Vec3 {
 }
 
 pub(super) fn make(scene: &Scene, setting: &Setting, _: &Means) -> Result<Box<dyn Engine>, Refusal> {
+    super::without_joints(scene)?;
     build(scene, setting).map(|world| Box::new(world) as Box<dyn Engine>).map_err(|e| Refusal::Failed(e.to_string()))
 }
 

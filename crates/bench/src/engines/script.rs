@@ -75,6 +75,7 @@ fn load(
     solver: &str,
     options: Value,
 ) -> Result<Box<dyn Engine>, Refusal> {
+    super::without_joints(scene)?;
     let idle = means.idle.clone();
     let waiting = {
         let mut idle = lock(&idle);
