@@ -4,9 +4,7 @@
 //! properties and colliders are absolute, so that a step that is run again finds what it would have found.
 
 use crate::bounds::STATE_LIMIT;
-use crate::math::{
-    finite, free, held_inverse_inertia, quat, rotate, rotate_back, scaled_axis, symmetric_times, vec3,
-};
+use crate::math::{finite, free, held_inverse_inertia, quat, rotate, rotate_back, scaled_axis, symmetric_times, vec3};
 use glam::{Quat, Vec3};
 use tumble_core::layout::{
     BodyProps, BodyState, Collider, EditRange, EditRecord, StepParams, body_flags, edit_op, locks,
