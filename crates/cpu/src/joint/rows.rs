@@ -54,14 +54,24 @@ impl Body {
         }
     }
 
+    /// The same without its pose.
+    pub fn still(body: &SolverBody) -> Self {
+        Self {
+            linear: vec3(body.linear_velocity),
+            angular: vec3(body.angular_velocity),
+            inverse_mass: body.inverse_mass,
+            inverse_inertia: inverse_inertia_of(body),
+            pose: Pose { translation: Vec3::ZERO, rotation: Quat::IDENTITY },
+        }
+    }
+
     /// The solver's body with these velocities; what joints add to them is no load of contacts.
-    pub fn put_velocities(&self, mut body: SolverBody) -> SolverBody {
+    pub fn put_velocities(&self, body: &mut SolverBody) {
         let (linear, angular) = (vec3(body.linear_velocity), vec3(body.angular_velocity));
         body.linear_start = (vec3(body.linear_start) + (self.linear - linear)).to_array();
         body.angular_start = (vec3(body.angular_start) + (self.angular - angular)).to_array();
         body.linear_velocity = self.linear.to_array();
         body.angular_velocity = self.angular.to_array();
-        body
     }
 
     /// The solver's body with this inertia. What contacts will add again to its angular velocity is what their torques do
@@ -233,6 +243,9 @@ impl Work {
 
     /// Chooses the pieces of all rows for the velocities and impulses as they are. Whether the system is another one by it.
     pub fn choose(&mut self, joint: &Joint, a: &Body, b: &Body, h: f32) -> bool {
+        if joint.flags & joint_bits::SOFT == 0 && self.axes >> joint_bits::DRIVEN & 63 == 0 {
+            return self.choose_locked(h);
+        }
         let mut changed = false;
         for axis in 0..6 {
             if (self.axes | self.axes >> joint_bits::DRIVEN) >> axis & 1 == 0 {
@@ -292,6 +305,21 @@ impl Work {
             body.linear -= body.inverse_mass * push;
             body.angular -= turn;
         }
+    }
+
+    /// The same where all axes are locked hard, or free.
+    fn choose_locked(&mut self, h: f32) -> bool {
+        let mut changed = false;
+        for which in (0..2).filter(|&which| used(self.axes, which) != 0) {
+            let coordinates = if which == 0 { self.frame.shift } else { self.frame.turn };
+            let (rows, block) = (used(self.axes, which), &mut self.blocks[which]);
+            for row in (0..3).filter(|row| rows >> row & 1 != 0 && block.own[*row] > 0.0) {
+                let piece = &mut block.pieces[row];
+                changed |= piece.kind != kind::LOCKED;
+                *piece = Piece { kind: kind::LOCKED, gamma: 0.0, goal: -coordinates[row] / h, off: coordinates[row] };
+            }
+        }
+        changed
     }
 
     /// Where an axis is.
@@ -372,9 +400,17 @@ impl Work {
 
     /// What lasts of the joint after a step: it breaks where its last sub-step asked for too much.
     pub fn lasting(&self, joint: &Joint, step: &StepParams) -> JointState {
-        let force = vec3(self.state.impulse).length() * step.inverse_h;
-        let torque = vec3(self.state.torque).length() * step.inverse_h;
-        let breaks = force > joint.break_force || torque > joint.break_torque;
+        let [separation, angle] = self.off_by(joint);
+        JointState {
+            broken: self.state.broken | u32::from(breaks(joint, &self.state, step)),
+            separation,
+            angle,
+            ..self.state
+        }
+    }
+
+    /// How far locked axes are off, m and rad.
+    pub fn off_by(&self, joint: &Joint) -> [f32; 2] {
         let (mut separation, mut angle) = (Vec3::ZERO, Vec3::ZERO);
         for row in 0..3 {
             if self.blocks[0].pieces[row].kind == kind::LOCKED {
@@ -384,12 +420,7 @@ impl Work {
                 angle[row] = self.frame.turn[row] - joint.drives[3 + row].low;
             }
         }
-        JointState {
-            broken: self.state.broken | u32::from(breaks),
-            separation: separation.length(),
-            angle: angle.length(),
-            ..self.state
-        }
+        [separation.length(), angle.length()]
     }
 
     /// What it gives its bodies in this sub-step, in the world.
@@ -398,6 +429,13 @@ impl Work {
         self.state.impulse = (self.frame.along * along.impulse).to_array();
         self.state.torque = (self.frame.about * about.impulse).to_array();
     }
+}
+
+/// Whether the last sub-step asked for more than the joint bears.
+pub fn breaks(joint: &Joint, state: &JointState, step: &StepParams) -> bool {
+    let force = vec3(state.impulse).length() * step.inverse_h;
+    let torque = vec3(state.torque).length() * step.inverse_h;
+    force > joint.break_force || torque > joint.break_torque
 }
 
 /// Turn of a body in a sub-step up to which a prediction of the separation is believed, rad.

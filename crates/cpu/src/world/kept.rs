@@ -264,7 +264,7 @@ impl Kept {
             let running =
                 (!joints.topology.joints.is_empty()).then(|| self.joints.running(&joints, &states, &self.props));
             solver::solve(&mut self.rows, moving, running.as_ref(), &step, restitution);
-            self.joints.store(&joints, &states, &mut bodies, &step);
+            self.joints.store(&joints, &states, &bodies, &step);
             self.store(&own.order, &matched, &manifolds);
         }
         let run = watch.next(run, "motion");
