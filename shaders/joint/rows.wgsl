@@ -326,9 +326,11 @@ fn predict(place: u32) {
             before = joint_states[slot].angular_remainder;
         }
         let kinds = joint_works[place].rows[which].kinds;
-        let all = change / h - active_velocities(place, which);
-        let hard = (kinds >= vec3<u32>(PIECE_LOCKED)) & (kinds <= vec3<u32>(PIECE_HIGH));
-        let off = select(vec3<f32>(), all, hard);
+        let locked = change / h - active_velocities(place, which);
+        // It may have come into the system just now, and have no rows yet.
+        let limited = change / h - row_velocities(place, which);
+        let at_limit = (kinds == vec3<u32>(PIECE_LOW)) | (kinds == vec3<u32>(PIECE_HIGH));
+        let off = select(select(vec3<f32>(), limited, at_limit), locked, kinds == vec3<u32>(PIECE_LOCKED));
         if which == 0u {
             joint_states[slot].remainder = off;
         } else {

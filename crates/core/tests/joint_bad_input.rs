@@ -125,7 +125,9 @@ fn motors_and_friction() {
     for axis in JointAxis::ALL {
         let motor = |values: [f32; 5]| {
             let [position, velocity, stiffness, damping, force] = values;
-            JointBuilder::generic(&[]).set_motor(axis, position, velocity, stiffness, damping).motor_max_force(axis, force)
+            JointBuilder::generic(&[])
+                .set_motor(axis, position, velocity, stiffness, damping)
+                .motor_max_force(axis, force)
         };
         for place in 0..5 {
             let mut values = [0.5, 1.0, 10.0, 1.0, 5.0];
@@ -175,7 +177,8 @@ fn softness_breaking_and_joints_that_hold_nothing() {
 #[test]
 fn handles_of_what_is_no_more() {
     let (mut scene, [fixed, _, a, b]) = bodies();
-    let joints = [[fixed, a], [a, b], [b, fixed]].map(|[x, y]| scene.insert_joint(x, y, JointBuilder::spherical()).unwrap());
+    let joints =
+        [[fixed, a], [a, b], [b, fixed]].map(|[x, y]| scene.insert_joint(x, y, JointBuilder::spherical()).unwrap());
     scene.remove_joint(joints[0]).unwrap();
     // The slot is taken again, and the handle names nobody.
     let again = scene.insert_joint(fixed, a, JointBuilder::fixed()).unwrap();
