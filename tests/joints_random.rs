@@ -61,7 +61,8 @@ fn kind(random: &mut Random, a: &RigidBodyBuilder, b: &RigidBodyBuilder, in_loop
         // Between the middles instead: a rod, or a rope that is nearly taut.
         let distance = a.translation.distance(b.translation);
         let slack = random.range(1.0, 1.2);
-        joint = if random.below(2) == 0 { JointBuilder::distance(distance) } else { JointBuilder::rope(slack * distance) };
+        joint =
+            if random.below(2) == 0 { JointBuilder::distance(distance) } else { JointBuilder::rope(slack * distance) };
     }
     joint.contacts_enabled(false)
 }
@@ -80,7 +81,9 @@ fn scene(seed: u64, recipe: Recipe) -> Scene {
     for _ in 0..count {
         let parent = random.below(bodies.len() as u32) as usize;
         // A free place of the lattice beside the parent's.
-        let step = |random: &mut Random| [Vec3::X, Vec3::Y, Vec3::Z][random.below(3) as usize] * if random.below(2) == 0 { 1.0 } else { -1.0 };
+        let step = |random: &mut Random| {
+            [Vec3::X, Vec3::Y, Vec3::Z][random.below(3) as usize] * if random.below(2) == 0 { 1.0 } else { -1.0 }
+        };
         let mut place = places[parent] + step(&mut random);
         while places.contains(&place) {
             place += step(&mut random);
@@ -92,7 +95,11 @@ fn scene(seed: u64, recipe: Recipe) -> Scene {
         }
         let mass = 10.0f32.powf(random.range(-0.5, 0.5) * recipe.decades);
         let mut size = || random.range(0.08, 0.2);
-        let collider = if count % 2 == 0 { ColliderBuilder::cuboid(size(), size(), size()) } else { ColliderBuilder::ball(size()) };
+        let collider = if count % 2 == 0 {
+            ColliderBuilder::cuboid(size(), size(), size())
+        } else {
+            ColliderBuilder::ball(size())
+        };
         let body = scene.insert(body, collider.mass(mass)).body;
         let ends = [bodies[parent], body].map(|b| scene.body(b).expect("living").clone());
         insert(&mut scene, bodies[parent], body, kind(&mut random, &ends[0], &ends[1], false));
@@ -117,19 +124,33 @@ fn explore() {
         Recipe { loops: 3, decades: 3.0, kicked: false },
         Recipe { loops: 3, decades: 3.0, kicked: true },
     ] {
-        for (how, by, params) in [("direct 4", By::Cpu, params(4)), ("direct 8", By::Cpu, params(8)), ("GS 4", By::Cpu, gauss_seidel(4)), ("rapier", By::Rapier, params(4))] {
-            let mut all: Vec<_> = (0..100u64).into_par_iter().map(|seed| (seed, std::panic::catch_unwind(|| watch(&scene(seed, recipe), by, params, 300)).ok())).collect();
+        for (how, by, params) in [
+            ("direct 4", By::Cpu, params(4)),
+            ("direct 8", By::Cpu, params(8)),
+            ("GS 4", By::Cpu, gauss_seidel(4)),
+            ("rapier", By::Rapier, params(4)),
+        ] {
+            let mut all: Vec<_> = (0..100u64)
+                .into_par_iter()
+                .map(|seed| (seed, std::panic::catch_unwind(|| watch(&scene(seed, recipe), by, params, 300)).ok()))
+                .collect();
             let bad = all.iter().filter(|w| w.1.is_none()).count();
             let over = |mm: f64| all.iter().filter(|w| w.1.is_some_and(|w| w.apart > mm)).count();
             let counts = [0.1, 1.0, 5.0, 50.0, 500.0].map(over);
             let gain = [0.1, 1.0, 10.0].map(|p| all.iter().filter(|w| w.1.is_some_and(|w| w.gained > p)).count());
             let angle = [0.01, 0.1].map(|p| all.iter().filter(|w| w.1.is_some_and(|w| w.angle > p)).count());
-            println!("{recipe:?} {how}: not finite {bad}; over 0.1, 1, 5, 50, 500 mm: {counts:?}; gained 0.1 1 10 %: {gain:?}; angle {angle:?}");
+            println!(
+                "{recipe:?} {how}: not finite {bad}; over 0.1, 1, 5, 50, 500 mm: {counts:?}; gained 0.1 1 10 %: {gain:?}; angle {angle:?}"
+            );
             if by == By::Cpu {
                 all.sort_by(|a, b| b.1.map_or(1e30, |w| w.apart).total_cmp(&a.1.map_or(1e30, |w| w.apart)));
-                for (seed, w) in &all[..3] { println!("   {seed} {:?}", w.map(|w| (w.apart, w.late, w.angle, w.gained, w.lost))); }
+                for (seed, w) in &all[..3] {
+                    println!("   {seed} {:?}", w.map(|w| (w.apart, w.late, w.angle, w.gained, w.lost)));
+                }
                 all.sort_by(|a, b| b.1.map_or(1e30, |w| w.gained).total_cmp(&a.1.map_or(1e30, |w| w.gained)));
-                for (seed, w) in &all[..2] { println!("   gain {seed} {:?}", w.map(|w| (w.apart, w.late, w.angle, w.gained, w.lost))); }
+                for (seed, w) in &all[..2] {
+                    println!("   gain {seed} {:?}", w.map(|w| (w.apart, w.late, w.angle, w.gained, w.lost)));
+                }
             }
         }
     }

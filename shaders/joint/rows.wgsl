@@ -264,9 +264,9 @@ fn choose(place: u32) -> bool {
                 joint_works[place].rows[which].impulse[row],
                 joint_works[place].rows[which].own[row],
             );
-            var new_piece = piece(axes, joints[slot].flags, joints[slot].frequency, joints[slot].damping_ratio,
-                joints[slot].drives[axis], axis, at, step.h);
             let kind = joint_works[place].rows[which].kinds[row];
+            var new_piece = piece(axes, joints[slot].flags, joints[slot].frequency, joints[slot].damping_ratio,
+                joints[slot].drives[axis], axis, at, step.h, kind);
             let gamma = joint_works[place].rows[which].gamma[row];
             if kind == new_piece.kind && abs(gamma - new_piece.gamma) <= SAME_SPRING * gamma {
                 // Its goal goes with either.
@@ -321,8 +321,11 @@ fn predict(place: u32) {
             before = joint_states[slot].angular_remainder;
         }
         let kinds = joint_works[place].rows[which].kinds;
-        let all = change / h - active_velocities(place, which);
-        let off = select(vec3<f32>(), all, kinds == vec3<u32>(PIECE_LOCKED));
+        let locked = change / h - active_velocities(place, which);
+        // It may have come into the system just now, and have no rows yet.
+        let limited = change / h - row_velocities(place, which);
+        let at_limit = (kinds == vec3<u32>(PIECE_LOW)) | (kinds == vec3<u32>(PIECE_HIGH));
+        let off = select(select(vec3<f32>(), limited, at_limit), locked, kinds == vec3<u32>(PIECE_LOCKED));
         if which == 0u {
             joint_states[slot].remainder = off;
         } else {
@@ -344,10 +347,13 @@ fn off_by(place: u32, which: u32) -> vec3<f32> {
         let row = firstTrailingBit(left);
         let axis = 3u * which + row;
         let kind = joint_works[place].rows[which].kinds[row];
-        if kind == PIECE_LOCKED || kind == PIECE_LOW {
-            off[row] = coordinates[row] - joints[slot].drives[axis].low;
+        let to_low = coordinates[row] - joints[slot].drives[axis].low;
+        if kind == PIECE_LOCKED {
+            off[row] = to_low;
+        } else if kind == PIECE_LOW {
+            off[row] = min(to_low, 0.0);
         } else if kind == PIECE_HIGH {
-            off[row] = coordinates[row] - joints[slot].drives[axis].high;
+            off[row] = max(coordinates[row] - joints[slot].drives[axis].high, 0.0);
         }
     }
     return off;

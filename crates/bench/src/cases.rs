@@ -109,17 +109,11 @@ const STANDING: &[Error] = &[SINK, DRIFT, DEEPEST, RESIDUAL];
 const HEAP: &[Error] = &[MEAN, DEEPEST, RESIDUAL];
 
 /// Farthest that any joint is from where it belongs, at the end.
-const SEPARATION: Error = Error {
-    name: "joint separation",
-    unit: "m",
-    of: |run| measures::joint_error(run.scene, run.poses).max_m,
-};
+const SEPARATION: Error =
+    Error { name: "joint separation", unit: "m", of: |run| measures::joint_error(run.scene, run.poses).max_m };
 /// Its mean over the joints.
-const MEAN_SEPARATION: Error = Error {
-    name: "mean separation",
-    unit: "m",
-    of: |run| measures::joint_error(run.scene, run.poses).mean_m,
-};
+const MEAN_SEPARATION: Error =
+    Error { name: "mean separation", unit: "m", of: |run| measures::joint_error(run.scene, run.poses).mean_m };
 const JOINED: &[Error] = &[SEPARATION, MEAN_SEPARATION];
 
 /// What a closed system must keep, of its beginning.

@@ -365,9 +365,12 @@ impl Work {
             let block = &self.blocks[which];
             let mut off = way / h - block.velocity(a, b);
             for row in 0..3 {
-                if !matches!(block.pieces[row].kind, kind::LOCKED | kind::LOW | kind::HIGH) {
-                    off[row] = 0.0;
-                }
+                off[row] = match block.pieces[row].kind {
+                    kind::LOCKED => off[row],
+                    // It may have come into the system just now, and have no rows yet.
+                    kind::LOW | kind::HIGH => way[row] / h - self.at(which, row, a, b).velocity,
+                    _ => 0.0,
+                };
             }
             let kept = if which == 0 { &mut self.state.remainder } else { &mut self.state.angular_remainder };
             let before = vec3(*kept);
