@@ -9,6 +9,12 @@ fn rows_in_use(axes: u32, which: u32) -> u32 {
     return ((axes >> (JOINT_LOCKED + 3u * which)) | (axes >> (JOINT_DRIVEN + 3u * which))) & 7u;
 }
 
+// The blocks that have rows: bit 0 along, bit 1 about. (Loops go through such bits and not from 0 to 2, since compilers would
+// write each turn of those out.)
+fn blocks_in_use(axes: u32) -> u32 {
+    return u32(rows_in_use(axes, 0u) != 0u) | (u32(rows_in_use(axes, 1u) != 0u) << 1u);
+}
+
 // Shorter distances of the anchors have no direction, m.
 const SHORTEST: f32 = 1e-9;
 

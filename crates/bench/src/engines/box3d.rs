@@ -39,7 +39,7 @@ fn build(scene: &Scene, setting: &Setting) -> boxddd::Result<Box3d> {
         let b = scene.body(handle).expect("a living body");
         let kind = match b.body_type {
             RigidBodyType::Fixed => BodyType::Static,
-            RigidBodyType::KinematicVelocityBased => BodyType::Kinematic,
+            RigidBodyType::KinematicVelocityBased | RigidBodyType::KinematicPositionBased => BodyType::Kinematic,
             RigidBodyType::Dynamic => BodyType::Dynamic,
         };
         let definition = foundation

@@ -86,6 +86,7 @@ impl RapierWorld {
             let builder = match b.body_type {
                 RigidBodyType::Fixed => r::RigidBodyBuilder::fixed(),
                 RigidBodyType::KinematicVelocityBased => r::RigidBodyBuilder::kinematic_velocity_based(),
+                RigidBodyType::KinematicPositionBased => r::RigidBodyBuilder::kinematic_position_based(),
                 RigidBodyType::Dynamic => r::RigidBodyBuilder::dynamic(),
             };
             let body = world.bodies.insert(
@@ -96,7 +97,14 @@ impl RapierWorld {
                     .gravity_scale(b.gravity_scale)
                     .linear_damping(b.linear_damping)
                     .angular_damping(b.angular_damping)
-                    .can_sleep(false),
+                    .can_sleep(false)
+                    .additional_solver_iterations((b.substep_factor as usize - 1) * params.accuracy.fewest() as usize)
+                    .enabled_translations(
+                        b.enabled_translations[0],
+                        b.enabled_translations[1],
+                        b.enabled_translations[2],
+                    )
+                    .enabled_rotations(b.enabled_rotations[0], b.enabled_rotations[1], b.enabled_rotations[2]),
             );
             for (_, c) in scene.colliders_of(handle).expect("a living body") {
                 let shape = match c.shape {

@@ -217,7 +217,7 @@ fn scene_json(scene: &Scene) -> Value {
         json!({
             "type": match b.body_type {
                 RigidBodyType::Fixed => "fixed",
-                RigidBodyType::KinematicVelocityBased => "kinematic",
+                RigidBodyType::KinematicVelocityBased | RigidBodyType::KinematicPositionBased => "kinematic",
                 RigidBodyType::Dynamic => "dynamic",
             },
             "translation": b.translation.to_array(), "rotation": b.rotation.to_array(),

@@ -25,6 +25,7 @@ pub use mechanisms::{
 };
 pub use motion::{
     bouncing_ball, bullet, closed_system, cradle, free_box, free_fall, pulled_box, ramp, sliding_box, slip_to_roll,
+    t_handle, tumbling_box,
 };
 pub use ragdolls::{RAGDOLL_BODIES, ragdoll, ragdolls, ragdolls_seeded};
 pub use stacks::{

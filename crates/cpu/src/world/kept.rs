@@ -195,11 +195,11 @@ impl Kept {
     fn edit(&mut self, edits: &EditBatch, step: &StepParams) -> Vec<BodyState> {
         self.props.resize(step.body_count as usize, BodyProps::zeroed());
         self.colliders.resize(step.collider_count as usize, Collider::zeroed());
-        let mut states = self.states.clone();
+        let mut states: Vec<BodyState> = self.states.iter().map(edit::begin).collect();
         states.resize(step.body_count as usize, BodyState::zeroed());
         let mut targets = edit::Targets { states: &mut states, props: &mut self.props, colliders: &mut self.colliders };
         for range in &edits.ranges {
-            edit::apply(*range, &edits.records, step.step, &mut targets);
+            edit::apply(*range, &edits.records, step, &mut targets);
         }
         states
     }
@@ -230,8 +230,8 @@ impl Kept {
         self.joints.reserve(&joints);
         let labels = self.labels(&states, &manifolds, &ends, &joints.topology.joined, step);
         control.islands = island::count(&labels);
-        if step.tolerance >= 0.0 {
-            level::decide(&mut states, &labels, &manifolds, &ends, step, &mut control);
+        if step.is_leveled() {
+            level::decide(&mut states, &self.props, &labels, &manifolds, &ends, step, &mut control);
         }
         let mut bodies: Vec<SolverBody> = (0..states.len())
             .into_par_iter()
