@@ -1,6 +1,7 @@
 //! Random trees and loops of bodies on joints of all kinds, with limits, friction, masses of 1 : 1000 and wild starts: the
-//! state stays finite, joints hold, no energy comes from anywhere. Oracle: analysis for the energy; bounds of separation
-//! are what was measured, see each.
+//! state stays finite, joints hold, no energy comes from anywhere. Oracle: analysis for the energy. Of 60 scenes with equal
+//! masses none gains any; with masses of 1 : 1000 up to 4 do (rapier: 28 to 35), where several limits hold in a corner, and
+//! up to 11 come apart by more than 5 mm (rapier: 57 to 60).
 
 #[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/beside.rs"]
@@ -13,11 +14,11 @@ mod jointed;
 #[path = "common/random.rs"]
 mod random;
 
-use jointed::{JOINT_SUBSTEPS, SIDES, gauss_seidel, params, watch};
+use jointed::{BESIDE, JOINT_SUBSTEPS, Watched, all_held, gauss_seidel, params, row, watch};
 use random::Random;
 use rayon::prelude::*;
 use tumble::prelude::*;
-use tumble_bench::hard_cases::By;
+use tumble_bench::hard_cases::{Ask, By, Case};
 
 use JointAxis::{AngX, AngY, AngZ, LinX, LinY, LinZ};
 
@@ -51,7 +52,9 @@ fn kind(random: &mut Random, a: &RigidBodyBuilder, b: &RigidBodyBuilder, in_loop
         .local_rotation1(a.rotation.inverse() * frame)
         .local_rotation2(b.rotation.inverse() * frame);
     for axis in JointAxis::ALL.into_iter().filter(|axis| !locked.contains(axis)) {
-        match random.below(4) {
+        // What slides has an end: else it falls out of the world.
+        let which = if (axis as usize) < 3 { 0 } else { random.below(4) };
+        match which {
             0 => joint = joint.limits(axis, [-random.range(0.1, 1.0), random.range(0.1, 1.0)]),
             1 => joint = joint.friction(axis, random.range(0.0, 0.5)),
             _ => {}
@@ -108,50 +111,59 @@ fn scene(seed: u64, recipe: Recipe) -> Scene {
     for _ in 0..recipe.loops {
         let a = random.below(count) as usize;
         let b = a + 1 + random.below(count - a as u32) as usize;
+        let joined = scene.joints().any(|joint| scene.joined(joint).is_ok_and(|pair| pair == [bodies[a], bodies[b]]));
         let ends = [bodies[a], bodies[b]].map(|b| scene.body(b).expect("living").clone());
-        insert(&mut scene, bodies[a], bodies[b], kind(&mut random, &ends[0], &ends[1], true));
+        let joint = kind(&mut random, &ends[0], &ends[1], true);
+        // Two joints of one pair may lock what is locked already, and more than a direct solve bears.
+        if !joined {
+            insert(&mut scene, bodies[a], bodies[b], joint);
+        }
     }
     scene
 }
 
+/// Scenes of each recipe.
+const SCENES: u64 = 60;
+
 #[test]
-fn explore() {
-    for recipe in [
-        Recipe { loops: 0, decades: 0.0, kicked: false },
-        Recipe { loops: 0, decades: 3.0, kicked: false },
-        Recipe { loops: 0, decades: 3.0, kicked: true },
-        Recipe { loops: 3, decades: 0.0, kicked: false },
-        Recipe { loops: 3, decades: 3.0, kicked: false },
-        Recipe { loops: 3, decades: 3.0, kicked: true },
-    ] {
-        for (how, by, params) in [
-            ("direct 4", By::Cpu, params(4)),
-            ("direct 8", By::Cpu, params(8)),
-            ("GS 4", By::Cpu, gauss_seidel(4)),
-            ("rapier", By::Rapier, params(4)),
-        ] {
-            let mut all: Vec<_> = (0..100u64)
-                .into_par_iter()
-                .map(|seed| (seed, std::panic::catch_unwind(|| watch(&scene(seed, recipe), by, params, 300)).ok()))
-                .collect();
-            let bad = all.iter().filter(|w| w.1.is_none()).count();
-            let over = |mm: f64| all.iter().filter(|w| w.1.is_some_and(|w| w.apart > mm)).count();
-            let counts = [0.1, 1.0, 5.0, 50.0, 500.0].map(over);
-            let gain = [0.1, 1.0, 10.0].map(|p| all.iter().filter(|w| w.1.is_some_and(|w| w.gained > p)).count());
-            let angle = [0.01, 0.1].map(|p| all.iter().filter(|w| w.1.is_some_and(|w| w.angle > p)).count());
-            println!(
-                "{recipe:?} {how}: not finite {bad}; over 0.1, 1, 5, 50, 500 mm: {counts:?}; gained 0.1 1 10 %: {gain:?}; angle {angle:?}"
-            );
-            if by == By::Cpu {
-                all.sort_by(|a, b| b.1.map_or(1e30, |w| w.apart).total_cmp(&a.1.map_or(1e30, |w| w.apart)));
-                for (seed, w) in &all[..3] {
-                    println!("   {seed} {:?}", w.map(|w| (w.apart, w.late, w.angle, w.gained, w.lost)));
-                }
-                all.sort_by(|a, b| b.1.map_or(1e30, |w| w.gained).total_cmp(&a.1.map_or(1e30, |w| w.gained)));
-                for (seed, w) in &all[..2] {
-                    println!("   gain {seed} {:?}", w.map(|w| (w.apart, w.late, w.angle, w.gained, w.lost)));
+fn random_joints_stay_finite_and_gain_no_energy() {
+    let mut missed = Vec::new();
+    for (loops, decades, kicked) in
+        [(0, 0.0, false), (0, 3.0, false), (0, 3.0, true), (3, 0.0, false), (3, 3.0, false), (3, 3.0, true)]
+    {
+        let recipe = Recipe { loops, decades, kicked };
+        let ratio = 10.0f32.powf(decades);
+        let start = if kicked { "kicked" } else { "let go" };
+        let shape = if loops == 0 { "trees" } else { "loops" };
+        let case = Case::new("C12", &format!("{SCENES} random {shape}, masses 1 : {ratio:>4}, {start}, 3 s"));
+        for &by in BESIDE {
+            let ways: &[(&str, Params)] = if by == By::Rapier {
+                &[("", params(JOINT_SUBSTEPS))]
+            } else {
+                &[("", params(JOINT_SUBSTEPS)), (", Gauss-Seidel", gauss_seidel(JOINT_SUBSTEPS))]
+            };
+            for (how, params) in ways {
+                let one = |seed: u64| watch(&scene(seed, recipe), by, *params, 180);
+                let all: Vec<Watched> = (0..SCENES).into_par_iter().map(one).collect();
+                // What is not finite is infinite.
+                let over =
+                    |most: f64, of: fn(&Watched) -> f64| all.iter().filter(|seen| of(seen) > most).count() as f64;
+                // Gauss-Seidel lets limits in corners go, and gains by it: told.
+                let ask = |most: f64| if how.is_empty() { Ask::AtMost(most) } else { Ask::Said };
+                for (quantity, value, ask) in [
+                    ("not finite", over(1e30, |seen| seen.apart + seen.gained), Ask::AtMost(0.0)),
+                    ("apart by more than 5 mm", over(5.0, |seen| seen.apart), ask(15.0)),
+                    (
+                        "gained more than 1 mm of height",
+                        over(1.0, |seen| seen.gained),
+                        ask(if decades > 0.0 { 6.0 } else { 0.0 }),
+                    ),
+                ] {
+                    let quantity = format!("{quantity}{how}");
+                    missed.push(row(&case, by, JOINT_SUBSTEPS, &quantity, "scenes", value, ask));
                 }
             }
         }
     }
+    all_held(missed);
 }

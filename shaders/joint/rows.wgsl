@@ -20,6 +20,8 @@ const THETA: f32 = 0.03;
 const KAPPA: f32 = 0.2;
 // What is believed of it at least.
 const LEAST: f32 = 0.3;
+// What an angle is beyond a limit by is undone up to here, rad: angles leap where a joint turns by more than half a turn.
+const JUMP: f32 = 0.2;
 // Springs that differ by no more than this share are one.
 const SAME_SPRING: f32 = 0.1;
 // Share of the geometric stiffness that joints add to the inertia.
@@ -322,9 +324,10 @@ fn predict(place: u32) {
         }
         let kinds = joint_works[place].rows[which].kinds;
         let locked = change / h - active_velocities(place, which);
-        // It may have come into the system just now, and have no rows yet.
+        // It may have come into the system just now, and have no rows yet. Angles may leap by a turn.
         let limited = change / h - row_velocities(place, which);
-        let at_limit = (kinds == vec3<u32>(PIECE_LOW)) | (kinds == vec3<u32>(PIECE_HIGH));
+        let at_a_limit = (kinds == vec3<u32>(PIECE_LOW)) | (kinds == vec3<u32>(PIECE_HIGH));
+        let at_limit = at_a_limit & vec3<bool>(which == 0u);
         let off = select(select(vec3<f32>(), limited, at_limit), locked, kinds == vec3<u32>(PIECE_LOCKED));
         if which == 0u {
             joint_states[slot].remainder = off;
@@ -354,6 +357,9 @@ fn off_by(place: u32, which: u32) -> vec3<f32> {
             off[row] = min(to_low, 0.0);
         } else if kind == PIECE_HIGH {
             off[row] = max(coordinates[row] - joints[slot].drives[axis].high, 0.0);
+        }
+        if which == 1u && kind != PIECE_LOCKED && abs(off[row]) > JUMP {
+            off[row] = 0.0;
         }
     }
     return off;

@@ -367,8 +367,8 @@ impl Work {
             for row in 0..3 {
                 off[row] = match block.pieces[row].kind {
                     kind::LOCKED => off[row],
-                    // It may have come into the system just now, and have no rows yet.
-                    kind::LOW | kind::HIGH => way[row] / h - self.at(which, row, a, b).velocity,
+                    // It may have come into the system just now, and have no rows yet. Angles may leap by a turn.
+                    kind::LOW | kind::HIGH if which == 0 => way[row] / h - self.at(which, row, a, b).velocity,
                     _ => 0.0,
                 };
             }
@@ -397,6 +397,10 @@ impl Work {
                 kind::HIGH => (coordinate - drive.high).max(0.0),
                 _ => 0.0,
             };
+            let limited = self.blocks[which].pieces[row].kind != kind::LOCKED;
+            if which == 1 && limited && off[row].abs() > JUMP {
+                off[row] = 0.0;
+            }
         }
         off
     }
@@ -447,6 +451,9 @@ pub const THETA: f32 = 0.03;
 pub const KAPPA: f32 = 0.2;
 /// What is believed of it at least.
 pub const LEAST: f32 = 0.3;
+/// What an angle is beyond a limit by is undone at once up to here, rad. Beyond, it has not gone there: rotation vectors
+/// leap where a joint turns by more than half a turn, and a leap of the body after them would make energy.
+pub const JUMP: f32 = 0.2;
 /// Springs that differ by no more than this share are one.
 pub const SAME_SPRING: f32 = 0.1;
 /// Share of the geometric stiffness that joints add to the inertia.
