@@ -191,7 +191,7 @@ fn several_at_a_time() {
                 let contact = |c| Contact { split: false, ..cpu.contact(&frame, c) };
                 rows.build(start, &cpu.colliders, &bodies, &frame.states, &frame.step, contact);
                 let moving = Bodies { solver: &mut bodies, states: &frame.states, props: &cpu.props };
-                threads.install(|| solve(&mut rows, moving, &frame.step, true));
+                threads.install(|| solve(&mut rows, moving, None, &frame.step, true));
                 let used = std::sync::Mutex::new(vec![Vec::new(); order.len()]);
                 rows.for_each_constraint(|c, solved| {
                     let count = frame.manifolds[order[c] as usize].count as usize;

@@ -199,7 +199,7 @@ impl Loose {
         let [a, b] = self.bodies.map(|slot| Body::of(&bodies.get(slot as usize), &scene.states[slot as usize]));
         work.refresh(joint, &a, &b);
         work.choose(joint, &a, &b, step.h);
-        work.lasting(joint, step)
+        work.lasting(joint)
     }
 }
 

@@ -9,7 +9,7 @@ use super::frame::{Frame, Pose, frame};
 use crate::math::{quat, rotate, vec3};
 use bytemuck::Zeroable;
 use glam::{Mat3, Quat, Vec3};
-use tumble_core::layout::{BodyProps, BodyState, Joint, JointState, SolverBody, StepParams, joint_bits};
+use tumble_core::layout::{BodyProps, BodyState, Joint, JointState, SolverBody, joint_bits};
 
 /// A body as joints see it.
 #[derive(Debug, Clone, Copy)]
@@ -173,6 +173,9 @@ impl Work {
         state.impulse = state.impulse.map(|x| scale * x);
         state.torque = state.torque.map(|x| scale * x);
         state.h = h;
+        if state.broken != 0 {
+            (state.impulse, state.torque) = ([0.0; 3], [0.0; 3]);
+        }
         let axes = if state.broken != 0 { 0 } else { joint.axes };
         let still = Pose { translation: Vec3::ZERO, rotation: Quat::IDENTITY };
         let blocks = [Block::default(); 2];
@@ -327,23 +330,22 @@ impl Work {
         let now = self.frame;
         let spin = h * a.angular.length().max(b.angular.length()) / THETA;
         let still = 1.0 / (1.0 + spin * spin * spin * spin);
+        let ways = [next.shift - now.shift, next.turn - now.turn];
+        let kept = [&mut self.state.remainder, &mut self.state.angular_remainder];
         let mut remainders = [Vec3::ZERO; 2];
-        for which in 0..2 {
-            let way = if which == 0 { next.shift - now.shift } else { next.turn - now.turn };
-            let block = &self.blocks[which];
+        for (((remainder, block), way), kept) in remainders.iter_mut().zip(&self.blocks).zip(ways).zip(kept) {
             let mut off = way / h - block.velocity(a, b);
             for row in 0..3 {
                 if block.pieces[row].kind != kind::LOCKED {
                     off[row] = 0.0;
                 }
             }
-            let kept = if which == 0 { &mut self.state.remainder } else { &mut self.state.angular_remainder };
             let before = vec3(*kept);
             *kept = off.to_array();
             let change = (off - before).length() / ((off.length() + before.length()) * KAPPA + 1e-9);
             let smooth = 1.0 / (1.0 + change * change * change * change);
             let belief = LEAST + (1.0 - LEAST) * still.max(smooth);
-            remainders[which] = off * belief;
+            *remainder = off * belief;
         }
         remainders
     }
@@ -366,10 +368,9 @@ impl Work {
     }
 
     /// What lasts of the joint after a step: it breaks where its last sub-step asked for too much.
-    pub fn lasting(&self, joint: &Joint, step: &StepParams) -> JointState {
-        let force = vec3(self.state.impulse).length() * step.inverse_h;
-        let torque = vec3(self.state.torque).length() * step.inverse_h;
-        let breaks = force > joint.break_force || torque > joint.break_torque;
+    pub fn lasting(&self, joint: &Joint) -> JointState {
+        let (impulse, torque) = (vec3(self.state.impulse).length(), vec3(self.state.torque).length());
+        let breaks = impulse > joint.break_force * self.state.h || torque > joint.break_torque * self.state.h;
         let (mut separation, mut angle) = (Vec3::ZERO, Vec3::ZERO);
         for row in 0..3 {
             if self.blocks[0].pieces[row].kind == kind::LOCKED {
