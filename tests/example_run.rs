@@ -12,7 +12,7 @@ use std::process::{Command, Output};
 use tumble::core::{measures, scenes};
 use tumble::{Accuracy, Backend, Broadphase, Params, World};
 
-const FIELDS: [&str; 23] = [
+const FIELDS: [&str; 24] = [
     "scene",
     "backend",
     "adapter",

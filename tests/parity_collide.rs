@@ -122,7 +122,7 @@ fn edits_of(bodies: usize, seed: u64) -> (PackedScene, EditBatch, Editor) {
         let shape = if i % 2 == 0 { ColliderBuilder::ball(0.3) } else { ColliderBuilder::cuboid(0.2, 0.3, 0.4) };
         editor.insert(body.linvel(offset), shape.translation(offset)).unwrap();
     }
-    let mut batch = editor.take();
+    let mut batch = editor.take(tumble_core::JointSolver::Auto);
     for record in batch.records.iter_mut().filter(|r| r.op == edit_op::POSE).step_by(5) {
         record.data[1][2] = f32::NAN.to_bits();
     }

@@ -57,8 +57,8 @@ fn check(what: &str, scene: &Scene, levels: u32, alone: &mut Alone) {
     alone.put("manifolds", &manifolds);
     alone.put("aabbs", &frame.aabbs);
     alone.put("islands", &labels);
-    alone.put("joints", if kept.is_empty() { &[Joint::zeroed()] } else { &set.joints });
-    alone.put("joint_states", if kept.is_empty() { &[JointState::zeroed()] } else { &kept });
+    alone.put("joints", &set.joints);
+    alone.put("joint_states", &kept);
     alone.put("island_credits", &vec![77u32; states.len()]);
     alone.put("island_overlaps", &vec![77u32; states.len()]);
     let groups = |count: usize| (count as u32).div_ceil(256) + 1;

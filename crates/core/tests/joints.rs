@@ -3,8 +3,8 @@
 use tumble_core::glam::{Quat, Vec3};
 use tumble_core::layout::{BodyState, JointState};
 use tumble_core::{
-    BodyHandle, ColliderBuilder, Editor, Error, JointAxis, JointBuilder, JointHandle, JointReading, JointSolver, Joints,
-    RigidBodyBuilder, Scene,
+    BodyHandle, ColliderBuilder, Editor, Error, JointAxis, JointBuilder, JointHandle, JointReading, JointSolver,
+    Joints, RigidBodyBuilder, Scene,
 };
 
 /// Two cubes, whose principal frames are their own, with a joint between them; the second one is where `place` says, as

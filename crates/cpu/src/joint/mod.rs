@@ -22,7 +22,8 @@ use std::ops::Range;
 use std::sync::Mutex;
 use tumble_core::JointSet;
 use tumble_core::layout::{
-    BREAK_NAMES, BodyProps, BodyState, Control, Joint, JointIsland, JointState, SolverBody, StepParams, joint_bits, touched,
+    BREAK_NAMES, BodyProps, BodyState, Control, Joint, JointIsland, JointState, SolverBody, StepParams, joint_bits,
+    touched,
 };
 
 /// A part of a sub-step.

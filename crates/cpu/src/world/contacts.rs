@@ -1,8 +1,8 @@
 //! Contacts and joints in bulk: see `tumble_core::contacts` and `tumble_core::joints`.
 
 use super::{World, asleep};
-use tumble_core::{Joints, Result};
 use tumble_core::contacts::{Committed, Contacts};
+use tumble_core::{Joints, Result};
 
 impl World {
     /// All contacts of the last step, none before the first. Edits that no step has applied are not seen: a body that

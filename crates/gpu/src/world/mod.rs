@@ -5,8 +5,8 @@ mod queries;
 mod results;
 
 use crate::broadphase::Choice;
-use crate::joint;
 use crate::joined::Joined;
+use crate::joint;
 use crate::query::Query;
 use crate::readback::{Readback, read_now};
 use crate::stages::{Built, Stages};
