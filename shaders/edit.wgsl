@@ -42,7 +42,13 @@ fn begin(
 ) {
     let i = invocation(wg, num, lid);
     if i < step.body_count {
-        work_states[i] = states[i];
+        var state = states[i];
+        if (state.flags & BODY_POSED) != 0u {
+            // What is moved by poses stands still until it is given one.
+            state.linear_velocity = vec3<f32>();
+            state.angular_velocity = vec3<f32>();
+        }
+        work_states[i] = state;
         masks[2u * i] = 0u;
         masks[2u * i + 1u] = 0u;
         claims[i] = NO_CLAIM;
@@ -154,6 +160,13 @@ fn apply_to_body(record: EditRecord, state: ptr<function, BodyState>, own_props:
             pull(state, *own_props, a, cross(b - (*state).position, a));
         }
         case EDIT_WAKE: {}
+        case EDIT_NEXT_POSE: {
+            let own = xyzw(record.data[1]);
+            let position = a + rotate(own, (*own_props).center_of_mass);
+            let turn = multiply(unit(multiply(own, (*own_props).frame)), conjugate((*state).rotation));
+            (*state).linear_velocity = (position - (*state).position) / step.dt;
+            (*state).angular_velocity = scaled_axis(turn) / step.dt;
+        }
         default: {
             (*state).flags |= BODY_FROZEN;
             (*state).linear_velocity = vec3<f32>();
@@ -162,11 +175,15 @@ fn apply_to_body(record: EditRecord, state: ptr<function, BodyState>, own_props:
     }
 }
 
-// Adds an impulse and an angular impulse.
+// Adds an impulse and an angular impulse. (Along locked axes velocities are taken away before they are looked at.)
 fn push(state: ptr<function, BodyState>, own_props: BodyProps, impulse: vec3<f32>, angular: vec3<f32>) {
     let q = (*state).rotation;
     let linear = (*state).linear_velocity + own_props.inverse_mass * impulse;
-    let turn = rotate(q, own_props.inverse_inertia * rotate_back(q, angular));
+    var turn = rotate(q, own_props.inverse_inertia * rotate_back(q, angular));
+    if (own_props.locked & LOCKED_ROTATIONS) != 0u {
+        let locked = three_bits(own_props.locked, LOCKED_FIRST_ROTATION);
+        turn = held_inverse_inertia(q, own_props.inertia, locked) * angular;
+    }
     (*state).linear_velocity = linear;
     (*state).angular_velocity = (*state).angular_velocity + turn;
 }
@@ -199,6 +216,8 @@ fn read_props(record: EditRecord) -> BodyProps {
     read.frame = xyzw(record.data[3]);
     read.angular_damping = bitcast<f32>(record.data[4].x);
     read.reach = bitcast<f32>(record.data[4].y);
+    read.locked = record.data[4].z;
+    read.least_level = record.data[4].w;
     return read;
 }
 

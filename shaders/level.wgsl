@@ -2,10 +2,13 @@
 //
 // What the last step left is measured where this one finds its contacts: the deepest overlap of each island, and the
 // widest separation of its joints. Where either is more than its tolerance the island wants the next level, which has
-// twice the sub-steps; after some calm steps, the one below. Bodies keep what their islands want, so that islands may meet and part: the most wanted counts.
+// twice the sub-steps; after some calm steps, the one below. Bodies keep what their islands want, so that islands may meet
+// and part: the most wanted counts. And no island gets less than any of its bodies asks for (`props`); without a tolerance
+// that is all it gets.
 //
-//   begin    one thread a body: clears island_credits and island_overlaps
-//   ask      the same: what its body wants, from work_states, for the island that `islands` names; in island_credits
+//   begin    one thread a body: clears island_credits, island_leasts and island_overlaps
+//   ask      the same: what its body wants, from work_states, and asks for, from props, for the island that `islands` names; in
+//            island_credits and island_leasts
 //   measure  one thread a pair: the overlap of its manifold, in island_overlaps. Reads next_pairs, manifolds, aabbs
 //   measure_joints  one thread a slot of a joint: its separation, in island_overlaps. Reads joints, joint_states
 //   decide   one thread a body: its island's next credit, in work_states; counts in counters
@@ -33,9 +36,10 @@ const NO_OVERLAP: f32 = 1e-30; // m: stands for that of contacts and joints that
 @group(0) @binding(6) var<storage, read> islands: array<u32>;
 @group(0) @binding(7) var<storage, read_write> island_credits: array<atomic<u32>>;
 @group(0) @binding(8) var<storage, read_write> island_overlaps: array<atomic<u32>>;
-
-@group(0) @binding(9) var<storage, read> joints: array<Joint>;
-@group(0) @binding(10) var<storage, read> joint_states: array<JointState>;
+@group(0) @binding(9) var<storage, read> props: array<BodyProps>;
+@group(0) @binding(10) var<storage, read_write> island_leasts: array<atomic<u32>>;
+@group(0) @binding(11) var<storage, read> joints: array<Joint>;
+@group(0) @binding(12) var<storage, read> joint_states: array<JointState>;
 
 var<workgroup> visits: atomic<u32>;
 var<workgroup> worst: atomic<u32>;
@@ -49,6 +53,7 @@ fn begin(
     let i = invocation(wg, num, lid);
     if i < step.body_count {
         atomicStore(&island_credits[i], 0u);
+        atomicStore(&island_leasts[i], 0u);
         atomicStore(&island_overlaps[i], 0u);
     }
 }
@@ -62,6 +67,7 @@ fn ask(
     let i = invocation(wg, num, lid);
     if i < step.body_count && islands[i] != NO_ISLAND {
         atomicMax(&island_credits[islands[i]], work_states[i].credit);
+        atomicMax(&island_leasts[islands[i]], props[i].least_level);
     }
 }
 
@@ -148,7 +154,7 @@ fn measure_joints(
 
 // What an island wants that wanted `credit` and has this overlap, m; the separation of joints counts as overlap.
 fn next_credit(credit: u32, overlap: f32, tolerance: f32) -> u32 {
-    if overlap == 0.0 {
+    if overlap == 0.0 || tolerance < 0.0 {
         return 0u;
     } else if overlap > tolerance {
         return min((credit / LEVEL_HOLD + 2u) * LEVEL_HOLD - 1u, MOST_CREDIT);
@@ -171,6 +177,7 @@ fn decide(
     let island = islands[i];
     let deepest = bitcast<f32>(atomicLoad(&island_overlaps[island]));
     var credit = next_credit(atomicLoad(&island_credits[island]), deepest, step.tolerance);
+    credit = max(credit, LEVEL_HOLD * atomicLoad(&island_leasts[island]));
     if atomicLoad(&counters[CONTROL_ISLANDS_OPEN]) != 0u {
         // Bodies that hang together must have the same level, and who does is not known.
         credit = MOST_CREDIT;
@@ -178,7 +185,7 @@ fn decide(
     work_states[i].credit = credit;
     atomicOr(&counters[CONTROL_LEVELS_WANTED], 1u << (credit / LEVEL_HOLD));
     atomicOr(&counters[CONTROL_LEVELS_USED], 1u << level_of(step.levels, credit));
-    if deepest > step.tolerance {
+    if step.tolerance >= 0.0 && deepest > step.tolerance {
         atomicAdd(&counters[CONTROL_BODIES_OVER], 1u);
     }
 }

@@ -41,9 +41,10 @@ const COUNTER_FROZEN_COUNT: u32 = 108u; // scratch word of the counters
 @group(0) @binding(8) var<storage, read> shares: array<u32>;
 @group(0) @binding(7) var<storage, read_write> counters: array<atomic<u32>>;
 
-// Acceleration by gravity and force, m/s².
+// Acceleration by gravity and force, m/s²; none along locked axes.
 fn acceleration(i: u32) -> vec3<f32> {
-    return step.gravity * props[i].gravity_scale + work_states[i].force * props[i].inverse_mass;
+    let all = step.gravity * props[i].gravity_scale + work_states[i].force * props[i].inverse_mass;
+    return select(all, vec3<f32>(), three_bits(props[i].locked, 0u));
 }
 
 // Whether body i is one of those of the step's level, or one that nothing pushes, which takes part in all.
@@ -133,10 +134,11 @@ fn turn(i: u32, h: f32) {
     let pieces = clamp(ceil(angle), 1.0, MAX_TURN);
     let piece = h / pieces;
     var delta = solver_bodies[i].delta;
-    // Kinematic bodies and round ones turn at a constant rate.
+    // Kinematic bodies, round ones and those held about an axis turn at a constant rate.
     let largest = max(inertia.x, max(inertia.y, inertia.z));
     let smallest = min(inertia.x, min(inertia.y, inertia.z));
-    let steady = !moves(work_states[i].flags) || largest - smallest <= 1e-6 * largest;
+    let held = (props[i].locked & LOCKED_ROTATIONS) != 0u;
+    let steady = !moves(work_states[i].flags) || largest - smallest <= 1e-6 * largest || held;
     for (var k = 0u; k < u32(pieces); k++) {
         if steady {
             delta = unit(multiply(half_turn(angular, piece), delta));
@@ -163,8 +165,16 @@ fn integrate_position(i: u32) {
     if kind == BODY_NONE || kind == BODY_FIXED || (work_states[i].flags & STILL) != 0u {
         return;
     }
+    let locked = props[i].locked;
+    if locked != 0u && moves(work_states[i].flags) {
+        // Whatever pushed it.
+        let linear = select(solver_bodies[i].linear_velocity, vec3<f32>(), three_bits(locked, 0u));
+        let turns = three_bits(locked, LOCKED_FIRST_ROTATION);
+        solver_bodies[i].linear_velocity = linear;
+        solver_bodies[i].angular_velocity = select(solver_bodies[i].angular_velocity, vec3<f32>(), turns);
+    }
     var way = solver_bodies[i].linear_velocity * step.h;
-    if solver_bodies[i].touched == 0u && kind == BODY_DYNAMIC {
+    if (solver_bodies[i].touched & TOUCHED_ANY) == 0u && kind == BODY_DYNAMIC {
         way -= acceleration(i) * (0.5 * step.h * step.h);
     }
     solver_bodies[i].translation = solver_bodies[i].translation + way;

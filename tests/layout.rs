@@ -74,7 +74,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         }
         BodyProps {
             inverse_inertia, inverse_mass, inertia, gravity_scale, center_of_mass, linear_damping, frame,
-            angular_damping, reach, pad_b, pad_c
+            angular_damping, reach, locked, least_level
         }
         Rest { position, time, rotation, island, pad_a, pad_b, pad_c }
         SolverBody {
@@ -159,8 +159,9 @@ macro_rules! constants {
 
 fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
     constants! {
-        body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN, ASLEEP, STAYS_AWAKE }
-        touched as "TOUCHED_" { CONTACT, JOINED }
+        body_flags as "BODY_" { NONE, FIXED, KINEMATIC, DYNAMIC, KIND, FROZEN, ASLEEP, STAYS_AWAKE, POSED }
+        locks as "LOCKED_" { TRANSLATIONS, ROTATIONS, FIRST_ROTATION }
+        touched as "TOUCHED_" { CONTACT, JOINED, ANY, FIRST_LOCK }
         joint_bits as "JOINT_" {
             LOCKED, DRIVEN, LIMITED, MOTOR, ALIVE, COUPLED, IN_CYCLE, SOFT, APART, FORCE_BASED
         }
@@ -172,7 +173,7 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
         }
         overflow as "OVERFLOW_" { NONE, PAIRS, TURNS, LAST_BATCH, UNBOUNDED, SWEEP }
         edit_op as "EDIT_" {
-            SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, WAKE,
+            SPAWN, PROPS, REMOVE, POSE, VELOCITY, IMPULSE, IMPULSE_AT, FORCE, FORCE_AT, FREEZE, WAKE, NEXT_POSE,
             COLLIDER, COLLIDER_REMOVE
         }
         query_word as "QUERY_" { UNBOUNDED, TURNS, TOTAL, COUNT }

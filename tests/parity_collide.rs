@@ -27,7 +27,7 @@ use frame::scene_of;
 use random::{Crowd, Random, step_of};
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::*;
-use tumble_core::{ColliderBuilder, Editor, PackedScene, Pose, RigidBodyBuilder};
+use tumble_core::{ColliderBuilder, Editor, JointSolver, PackedScene, Pose, RigidBodyBuilder};
 use tumble_cpu::bounds::{self, FAR, STATE_LIMIT, size_class};
 use tumble_cpu::broadphase::{Boxes, CLASSES};
 use tumble_cpu::edit;
@@ -61,7 +61,8 @@ fn begin_copies_states_and_clears_counters() {
     for permute in PERMUTATIONS {
         let mut alone = Alone::new(permute);
         for bodies in SIZES {
-            let crowd = Crowd::new(bodies, 1);
+            let mut crowd = Crowd::new(bodies, 1);
+            crowd.states.iter_mut().step_by(3).for_each(|state| state.flags |= body_flags::POSED);
             alone.put("step", &[crowd.step]);
             alone.put("states", &crowd.states);
             alone.put("work_states", &vec![[GARBAGE; 24]; bodies]);
@@ -70,7 +71,8 @@ fn begin_copies_states_and_clears_counters() {
             alone.put("class_histogram", &[GARBAGE; CLASSES]);
             alone.put("counters", &[GARBAGE; size_of::<Control>() / 4]);
             alone.run(|chain| chain.pass("edit", "begin", (bodies.max(CLASSES) as u32).div_ceil(256)));
-            assert!(alone.take::<BodyState>("work_states") == crowd.states, "{bodies} bodies");
+            let begun: Vec<BodyState> = crowd.states.iter().map(edit::begin).collect();
+            assert!(alone.take::<BodyState>("work_states") == begun, "{bodies} bodies");
             assert!(alone.take::<u32>("masks").iter().all(|&word| word == 0));
             assert!(alone.take::<u32>("claims").iter().all(|&claim| claim == u32::MAX));
             assert!(alone.take::<u32>("class_histogram").iter().all(|&count| count == 0));
@@ -89,7 +91,8 @@ fn begin_copies_states_and_clears_counters() {
 /// One step's edits of a scene: every kind, some bodies with several, some with numbers that are none.
 fn edits_of(bodies: usize, seed: u64) -> (PackedScene, EditBatch, Editor) {
     let mut random = Random::new(seed);
-    let (mut editor, packed) = Editor::new(scene_of(bodies)).unwrap();
+    let (mut editor, mut packed) = Editor::new(scene_of(bodies)).unwrap();
+    packed.props.iter_mut().enumerate().step_by(2).for_each(|(i, props)| props.locked = i as u32 / 15 % 64);
     let handles: Vec<_> = editor.scene().bodies().collect();
     for (i, &body) in handles.iter().enumerate() {
         let (a, b, q) = (random.vector(9.0), random.vector(9.0), random.rotation());
@@ -122,7 +125,10 @@ fn edits_of(bodies: usize, seed: u64) -> (PackedScene, EditBatch, Editor) {
         let shape = if i % 2 == 0 { ColliderBuilder::ball(0.3) } else { ColliderBuilder::cuboid(0.2, 0.3, 0.4) };
         editor.insert(body.linvel(offset), shape.translation(offset)).unwrap();
     }
-    let mut batch = editor.take(tumble_core::JointSolver::Auto);
+    let mut batch = editor.take(JointSolver::default());
+    for record in batch.records.iter_mut().filter(|r| r.op == edit_op::POSE).skip(1).step_by(5) {
+        record.op = edit_op::NEXT_POSE;
+    }
     for record in batch.records.iter_mut().filter(|r| r.op == edit_op::POSE).step_by(5) {
         record.data[1][2] = f32::NAN.to_bits();
     }
@@ -156,7 +162,7 @@ fn edits_change_the_same_things() {
                 if stop == 0 {
                     let targets =
                         &mut edit::Targets { states: &mut states, props: &mut props, colliders: &mut colliders };
-                    batch.ranges.iter().for_each(|range| edit::apply(*range, &batch.records, step.step, targets));
+                    batch.ranges.iter().for_each(|range| edit::apply(*range, &batch.records, &step, targets));
                 }
                 assert!(alone.take::<BodyProps>("props") == props, "{bodies} bodies, stop {stop}");
                 assert!(alone.take::<Collider>("colliders") == colliders, "{bodies} bodies, stop {stop}");

@@ -34,18 +34,23 @@ fn joints(bodies: usize) -> (JointSet, Vec<JointState>) {
 
 /// Bodies that want one thing and another, over contacts some of which overlap by too much, and with joints
 /// some of which are too far apart.
-fn check(what: &str, scene: &Scene, levels: u32, alone: &mut Alone) {
-    let frame = Cpu::after(scene, 40).plan(false);
+fn check(what: &str, scene: &Scene, levels: u32, tolerance: f32, alone: &mut Alone) {
+    let cpu = Cpu::after(scene, 40);
+    let frame = cpu.plan(false);
     let (mut states, mut manifolds) = (frame.states.clone(), frame.manifolds.clone());
     for (i, state) in states.iter_mut().enumerate() {
         state.credit = [0, 0, 0, 5, 17, 33, 0, 63][i * 7 % 8];
+    }
+    let mut props = cpu.props.clone();
+    for (i, props) in props.iter_mut().enumerate() {
+        props.least_level = [0, 0, 0, 2, 0, 0, 0, 0, 0, 1, 0][i * 5 % 11];
     }
     for (i, manifold) in manifolds.iter_mut().enumerate() {
         let apart = [1e-3, -1e-6, -2e-4, 5e-3, -3e-3][i * 13 % 5];
         manifold.points.iter_mut().for_each(|point| point.separation = apart);
     }
     // A tenth of a millimetre between joints, and a millimetre of overlap.
-    let step = StepParams { tolerance: 1e-3, joint_scale: 10.0, levels, substeps: 4, ..frame.step };
+    let step = StepParams { tolerance, joint_scale: 10.0, levels, substeps: 4, ..frame.step };
     let (set, kept) = joints(states.len());
     let labels = island::label(&states, &manifolds, &frame.ends, &[]);
     let mut control = control_of(&frame, false);
@@ -53,6 +58,7 @@ fn check(what: &str, scene: &Scene, levels: u32, alone: &mut Alone) {
     alone.put("step", &[step]);
     alone.put("counters", &[control]);
     alone.put("work_states", &states);
+    alone.put("props", &props);
     alone.put("next_pairs", &frame.matched.pairs);
     alone.put("manifolds", &manifolds);
     alone.put("aabbs", &frame.aabbs);
@@ -60,6 +66,7 @@ fn check(what: &str, scene: &Scene, levels: u32, alone: &mut Alone) {
     alone.put("joints", &set.joints);
     alone.put("joint_states", &kept);
     alone.put("island_credits", &vec![77u32; states.len()]);
+    alone.put("island_leasts", &vec![77u32; states.len()]);
     alone.put("island_overlaps", &vec![77u32; states.len()]);
     let groups = |count: usize| (count as u32).div_ceil(256) + 1;
     let (by_pair, by_body, by_joint) = (groups(manifolds.len()), groups(states.len()), groups(kept.len()));
@@ -75,7 +82,7 @@ fn check(what: &str, scene: &Scene, levels: u32, alone: &mut Alone) {
 
     let touching = level::Touching { manifolds: &manifolds, ends: &frame.ends };
     let held = level::Held { joints: &set, states: &kept };
-    level::decide(&mut states, &labels, &touching, &held, &step, &mut control);
+    level::decide(&mut states, &props, &labels, &touching, &held, &step, &mut control);
     let gpu: Vec<BodyState> = alone.take("work_states");
     assert!(gpu.iter().map(|s| s.credit).eq(states.iter().map(|s| s.credit)), "{what}: credits");
     assert!(gpu == states, "{what}: nothing but credits changes");
@@ -87,11 +94,18 @@ fn islands_get_what_the_mirrors_get() {
     for permute in PERMUTATIONS {
         let mut alone = Alone::new(permute);
         for bodies in [0, 1, 2, 255, 256, 257, 3000] {
-            check(&format!("{bodies} bodies, order {permute}"), &scene_of(bodies), 0b0101, &mut alone);
+            check(&format!("{bodies} bodies, order {permute}"), &scene_of(bodies), 0b0101, 1e-3, &mut alone);
+            check(
+                &format!("{bodies} bodies, no tolerance, order {permute}"),
+                &scene_of(bodies),
+                0b0101,
+                -1.0,
+                &mut alone,
+            );
         }
         for levels in [0b0001, 0b1000, 0b1111] {
             let what = format!("pyramids, levels {levels:b}, order {permute}");
-            check(&what, &scenes::many_pyramids(9, 5), levels, &mut alone);
+            check(&what, &scenes::many_pyramids(9, 5), levels, 1e-3, &mut alone);
         }
     }
 }
@@ -110,6 +124,7 @@ fn credit_rises_at_once_and_falls_when_calm() {
     assert_eq!(next(40, 1e-4), 39, "calm");
     assert_eq!(next(0, 1e-4), 0);
     assert_eq!(next(63, 0.0), 0, "no contact");
+    assert_eq!(level::next_credit(40, 2e-3, -1.0), 0, "no tolerance");
 }
 
 /// Oracle: the law in words.

@@ -56,7 +56,7 @@ impl Grab {
                         return Ok(None);
                     }
                 }
-                RigidBodyType::KinematicVelocityBased => return Ok(None),
+                RigidBodyType::KinematicVelocityBased | RigidBodyType::KinematicPositionBased => return Ok(None),
             }
             // From inside the wall, on to its far side.
             let on = 1e-4 * (point - origin).length().max(1e-3);

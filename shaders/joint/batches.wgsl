@@ -39,7 +39,8 @@ fn make_rows(place: u32) {
     if choose(place) {
         rebuild(place);
     }
-    for (var which = 0u; which < 2u; which++) {
+    for (var blocks = blocks_in_use(joint_works[place].axes); blocks != 0u; blocks &= blocks - 1u) {
+        let which = firstTrailingBit(blocks);
         joint_works[place].rows[which].mass = inverse3(diagonal_block(place, which));
     }
 }
@@ -83,15 +84,14 @@ fn push_along(place: u32, which: u32, impulse: vec3<f32>) {
 }
 
 fn visit_rows(place: u32, relaxes: bool) {
-    for (var which = 0u; which < 2u; which++) {
-        if rows_in_use(joint_works[place].axes, which) == 0u {
-            continue;
-        }
+    for (var blocks = blocks_in_use(joint_works[place].axes); blocks != 0u; blocks &= blocks - 1u) {
+        let which = firstTrailingBit(blocks);
         let velocities = row_velocities(place, which);
         let kinds = joint_works[place].rows[which].kinds;
         let before = joint_works[place].rows[which].impulse;
         var lacking: vec3<f32>;
-        for (var row = 0u; row < 3u; row++) {
+        for (var left = rows_in_use(joint_works[place].axes, which); left != 0u; left &= left - 1u) {
+            let row = firstTrailingBit(left);
             lacking[row] = row_lack(kinds[row], joint_works[place].rows[which].goal[row], velocities[row],
                 joint_works[place].rows[which].gamma[row], before[row], relaxes);
         }
@@ -108,10 +108,9 @@ fn warm_start_one(place: u32) {
     if level_of_joint(place) != step.level {
         return;
     }
-    for (var which = 0u; which < 2u; which++) {
-        if rows_in_use(joint_works[place].axes, which) != 0u {
-            push_along(place, which, joint_works[place].rows[which].impulse);
-        }
+    for (var blocks = blocks_in_use(joint_works[place].axes); blocks != 0u; blocks &= blocks - 1u) {
+        let which = firstTrailingBit(blocks);
+        push_along(place, which, joint_works[place].rows[which].impulse);
     }
 }
 

@@ -34,8 +34,9 @@ struct Motor {
     most: f32,
 }
 
-// The piece that holds for an axis of a joint over a sub-step of length h.
-fn piece(axes: u32, flags: u32, frequency: f32, damping_ratio: f32, drive: JointDrive, axis: u32, at: AxisState, h: f32) -> Piece {
+// The piece that holds for an axis of a joint over a sub-step of length h, where `was` held before: no choice leaps from one
+// limit to the other.
+fn piece(axes: u32, flags: u32, frequency: f32, damping_ratio: f32, drive: JointDrive, axis: u32, at: AxisState, h: f32, was: u32) -> Piece {
     if at.response <= 0.0 {
         return Piece(PIECE_FIXED, 0.0, 0.0);
     }
@@ -50,12 +51,12 @@ fn piece(axes: u32, flags: u32, frequency: f32, damping_ratio: f32, drive: Joint
     let rub = drive.friction * h;
     let free = at.velocity - at.response * at.impulse;
     if limited {
-        let to_low = (drive.low - at.coordinate) / h;
-        let to_high = (drive.high - at.coordinate) / h;
-        if (to_low - free) / at.response > motor_impulse(motor, to_low) + select(rub, -rub, to_low > 0.0) {
+        let to_low = min((drive.low - at.coordinate) / h, 0.0);
+        let to_high = max((drive.high - at.coordinate) / h, 0.0);
+        if was != PIECE_HIGH && (to_low - free) / at.response > motor_impulse(motor, to_low) + select(rub, -rub, to_low > 0.0) {
             return Piece(PIECE_LOW, 0.0, to_low);
         }
-        if (to_high - free) / at.response < motor_impulse(motor, to_high) - select(rub, -rub, -to_high > 0.0) {
+        if was != PIECE_LOW && (to_high - free) / at.response < motor_impulse(motor, to_high) - select(rub, -rub, -to_high > 0.0) {
             return Piece(PIECE_HIGH, 0.0, to_high);
         }
     }

@@ -4,6 +4,17 @@
 //#import shared/joint.wgsl
 //#import shared/math.wgsl
 
+// The rows along (0) or about (1) that something may act on, a bit a row; what has none is left out everywhere.
+fn rows_in_use(axes: u32, which: u32) -> u32 {
+    return ((axes >> (JOINT_LOCKED + 3u * which)) | (axes >> (JOINT_DRIVEN + 3u * which))) & 7u;
+}
+
+// The blocks that have rows: bit 0 along, bit 1 about. (Loops go through such bits and not from 0 to 2, since compilers would
+// write each turn of those out.)
+fn blocks_in_use(axes: u32) -> u32 {
+    return u32(rows_in_use(axes, 0u) != 0u) | (u32(rows_in_use(axes, 1u) != 0u) << 1u);
+}
+
 // Shorter distances of the anchors have no direction, m.
 const SHORTEST: f32 = 1e-9;
 
@@ -35,8 +46,12 @@ fn joint_frame(joint: Joint, rotation_a: vec4<f32>, rotation_b: vec4<f32>, betwe
     var found: JointFrame;
     found.arm_a = to_a + offset;
     found.arm_b = arm_b;
-    found.along = axes_along(joint.axes, joint.flags, qa, offset);
-    found.about = axes_about(joint.axes, qa, qb);
+    if rows_in_use(joint.axes, 0u) != 0u {
+        found.along = axes_along(joint.axes, joint.flags, qa, offset);
+    }
+    if rows_in_use(joint.axes, 1u) != 0u {
+        found.about = axes_about(joint.axes, qa, qb);
+    }
     return found;
 }
 

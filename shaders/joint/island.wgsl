@@ -15,6 +15,8 @@
 // How often pieces are chosen in a sub-step.
 const CHOICES: u32 = 3u;
 const INVOCATIONS: u32 = 64u;
+// Solves of a relaxation.
+const TURNS: u32 = 2u;
 
 @group(0) @binding(10) var<storage, read_write> joint_factors: array<vec4<f32>>;
 
@@ -273,6 +275,9 @@ fn begin(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
         refresh(k);
         carry_impulses(k);
         _ = choose(k);
+    }
+    storageBarrier();
+    for (var k = island.first_joint + lid; k < island.first_joint + island.joint_count; k += INVOCATIONS) {
         rebuild(k);
     }
     storageBarrier();
@@ -289,17 +294,21 @@ fn solve(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
         atomicStore(&shared_changed, 0u);
     }
     workgroupBarrier();
-    for (var k = island.first_joint + lid; k < island.first_joint + island.joint_count; k += INVOCATIONS) {
-        look(k);
-        if choose(k) {
-            atomicOr(&shared_changed, 1u);
-        }
-        joint_works[k].rows[0].impulse = vec3<f32>();
-        joint_works[k].rows[1].impulse = vec3<f32>();
-        predict(k);
-    }
-    storageBarrier();
     for (var choice = 0u; choice < CHOICES; choice++) {
+        for (var k = island.first_joint + lid; k < island.first_joint + island.joint_count; k += INVOCATIONS) {
+            if choice == 0u {
+                look(k);
+            }
+            if choose(k) {
+                atomicOr(&shared_changed, 1u);
+            }
+            if choice == 0u {
+                joint_works[k].rows[0].impulse = vec3<f32>();
+                joint_works[k].rows[1].impulse = vec3<f32>();
+                predict(k);
+            }
+        }
+        storageBarrier();
         let changed = take_changed(lid);
         if choice > 0u && changed == 0u {
             break;
@@ -326,13 +335,6 @@ fn solve(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
         substitute(island, lid);
         take_values(island, lid, true);
         push_bodies(island, lid, false);
-        if choice + 1u < CHOICES {
-            for (var k = island.first_joint + lid; k < island.first_joint + island.joint_count; k += INVOCATIONS) {
-                if choose(k) {
-                    atomicOr(&shared_changed, 1u);
-                }
-            }
-        }
     }
 }
 
@@ -355,22 +357,25 @@ fn relax(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
     }
     storageBarrier();
     factor(island, lid);
-    for (var k = island.first_block + lid; k < island.first_block + island.block_count; k += INVOCATIONS) {
-        let row = joint_tables[joint_layout.blocks + 8u * k];
-        joint_factors[value_at(k)] = vec4<f32>(-off_by(row >> 1u, row & 1u), 0.0);
+    // First the poses, then the velocities.
+    for (var turn = 0u; turn < TURNS; turn++) {
+        for (var k = island.first_block + lid; k < island.first_block + island.block_count; k += INVOCATIONS) {
+            let row = joint_tables[joint_layout.blocks + 8u * k];
+            if turn == 0u {
+                joint_factors[value_at(k)] = vec4<f32>(-off_by(row >> 1u, row & 1u), 0.0);
+            } else {
+                joint_factors[value_at(k)] = vec4<f32>(lack(row >> 1u, row & 1u, true), 0.0);
+            }
+        }
+        storageBarrier();
+        substitute(island, lid);
+        take_values(island, lid, turn != 0u);
+        if turn == 0u {
+            project_bodies(island, lid);
+        } else {
+            push_bodies(island, lid, false);
+        }
     }
-    storageBarrier();
-    substitute(island, lid);
-    take_values(island, lid, false);
-    project_bodies(island, lid);
-    for (var k = island.first_block + lid; k < island.first_block + island.block_count; k += INVOCATIONS) {
-        let row = joint_tables[joint_layout.blocks + 8u * k];
-        joint_factors[value_at(k)] = vec4<f32>(lack(row >> 1u, row & 1u, true), 0.0);
-    }
-    storageBarrier();
-    substitute(island, lid);
-    take_values(island, lid, true);
-    push_bodies(island, lid, false);
     for (var k = island.first_joint + lid; k < island.first_joint + island.joint_count; k += INVOCATIONS) {
         keep_impulses(k);
     }

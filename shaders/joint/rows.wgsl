@@ -152,6 +152,12 @@ fn begin_joint(place: u32) {
         joint_works[place].rows[which].gamma = vec3<f32>();
         joint_works[place].rows[which].goal = vec3<f32>();
         joint_works[place].rows[which].remainder = vec3<f32>();
+        joint_works[place].rows[which].own = vec3<f32>();
+        joint_works[place].rows[which].along = mat3x3<f32>();
+        joint_works[place].rows[which].turn_a = mat3x3<f32>();
+        joint_works[place].rows[which].turn_b = mat3x3<f32>();
+        joint_works[place].rows[which].response_a = mat3x3<f32>();
+        joint_works[place].rows[which].response_b = mat3x3<f32>();
     }
 }
 
@@ -187,23 +193,17 @@ fn look(place: u32) {
     joint_works[place].turned = now.about.coordinates;
 }
 
-fn rows_in_use(axes: u32, which: u32) -> u32 {
-    return ((axes >> (JOINT_LOCKED + 3u * which)) | (axes >> (JOINT_DRIVEN + 3u * which))) & 7u;
-}
-
 // The rows that are active, from the axes.
 fn rebuild(place: u32) {
     let ia = joint_works[place].body_a;
     let ib = joint_works[place].body_b;
     let masses = solver_bodies[ia].inverse_mass + solver_bodies[ib].inverse_mass;
-    for (var which = 0u; which < 2u; which++) {
-        let used = rows_in_use(joint_works[place].axes, which);
+    for (var blocks = blocks_in_use(joint_works[place].axes); blocks != 0u; blocks &= blocks - 1u) {
+        let which = firstTrailingBit(blocks);
         var own: vec3<f32>;
-        for (var row = 0u; row < 3u; row++) {
-            var axis = vec3<f32>();
-            if ((used >> row) & 1u) != 0u {
-                axis = select(joint_works[place].about[row], joint_works[place].along[row], which == 0u);
-            }
+        for (var left = rows_in_use(joint_works[place].axes, which); left != 0u; left &= left - 1u) {
+            let row = firstTrailingBit(left);
+            let axis = select(joint_works[place].about[row], joint_works[place].along[row], which == 0u);
             var turn_a = axis;
             var turn_b = axis;
             var push = vec3<f32>();
@@ -255,17 +255,12 @@ fn choose(place: u32) -> bool {
     let slot = joint_works[place].slot;
     let axes = joint_works[place].axes;
     var changed = false;
-    for (var which = 0u; which < 2u; which++) {
-        let used = rows_in_use(axes, which);
-        if used == 0u {
-            continue;
-        }
+    for (var blocks = blocks_in_use(axes); blocks != 0u; blocks &= blocks - 1u) {
+        let which = firstTrailingBit(blocks);
         let velocities = row_velocities(place, which);
         let coordinates = select(joint_works[place].turned, joint_works[place].shift, which == 0u);
-        for (var row = 0u; row < 3u; row++) {
-            if ((used >> row) & 1u) == 0u {
-                continue;
-            }
+        for (var left = rows_in_use(axes, which); left != 0u; left &= left - 1u) {
+            let row = firstTrailingBit(left);
             let axis = 3u * which + row;
             let at = AxisState(
                 coordinates[row],
@@ -273,9 +268,9 @@ fn choose(place: u32) -> bool {
                 joint_works[place].rows[which].impulse[row],
                 joint_works[place].rows[which].own[row],
             );
-            var new_piece = piece(axes, joints[slot].flags, joints[slot].frequency, joints[slot].damping_ratio,
-                joints[slot].drives[axis], axis, at, step.h);
             let kind = joint_works[place].rows[which].kinds[row];
+            var new_piece = piece(axes, joints[slot].flags, joints[slot].frequency, joints[slot].damping_ratio,
+                joints[slot].drives[axis], axis, at, step.h, kind);
             let gamma = joint_works[place].rows[which].gamma[row];
             if kind == new_piece.kind && abs(gamma - new_piece.gamma) <= SAME_SPRING * gamma {
                 // Its goal goes with either.
@@ -298,7 +293,8 @@ fn lack(place: u32, which: u32, relax: bool) -> vec3<f32> {
     let gamma = joint_works[place].rows[which].gamma;
     let impulse = joint_works[place].rows[which].impulse;
     var lacking: vec3<f32>;
-    for (var row = 0u; row < 3u; row++) {
+    for (var left = rows_in_use(joint_works[place].axes, which); left != 0u; left &= left - 1u) {
+        let row = firstTrailingBit(left);
         if kinds[row] != PIECE_FIXED {
             let wanted = select(goal[row], 0.0, relax && kinds[row] != PIECE_SOFT);
             lacking[row] = wanted - velocities[row] - gamma[row] * impulse[row];
@@ -320,7 +316,8 @@ fn predict(place: u32) {
     let fastest = max(sqrt(dot(a.angular, a.angular)), sqrt(dot(b.angular, b.angular)));
     let spin = h * fastest / THETA;
     let still = 1.0 / (1.0 + spin * spin * spin * spin);
-    for (var which = 0u; which < 2u; which++) {
+    for (var blocks = blocks_in_use(joint_works[place].axes); blocks != 0u; blocks &= blocks - 1u) {
+        let which = firstTrailingBit(blocks);
         var change = next.along.coordinates - joint_works[place].shift;
         var before = joint_states[slot].remainder;
         if which == 1u {
@@ -328,8 +325,11 @@ fn predict(place: u32) {
             before = joint_states[slot].angular_remainder;
         }
         let kinds = joint_works[place].rows[which].kinds;
-        let all = change / h - active_velocities(place, which);
-        let off = select(vec3<f32>(), all, kinds == vec3<u32>(PIECE_LOCKED));
+        let locked = change / h - active_velocities(place, which);
+        // It may have come into the system just now, and have no rows yet.
+        let limited = change / h - row_velocities(place, which);
+        let at_limit = (kinds == vec3<u32>(PIECE_LOW)) | (kinds == vec3<u32>(PIECE_HIGH));
+        let off = select(select(vec3<f32>(), limited, at_limit), locked, kinds == vec3<u32>(PIECE_LOCKED));
         if which == 0u {
             joint_states[slot].remainder = off;
         } else {
@@ -347,13 +347,17 @@ fn off_by(place: u32, which: u32) -> vec3<f32> {
     let slot = joint_works[place].slot;
     let coordinates = select(joint_works[place].turned, joint_works[place].shift, which == 0u);
     var off: vec3<f32>;
-    for (var row = 0u; row < 3u; row++) {
+    for (var left = rows_in_use(joint_works[place].axes, which); left != 0u; left &= left - 1u) {
+        let row = firstTrailingBit(left);
         let axis = 3u * which + row;
         let kind = joint_works[place].rows[which].kinds[row];
-        if kind == PIECE_LOCKED || kind == PIECE_LOW {
-            off[row] = coordinates[row] - joints[slot].drives[axis].low;
+        let to_low = coordinates[row] - joints[slot].drives[axis].low;
+        if kind == PIECE_LOCKED {
+            off[row] = to_low;
+        } else if kind == PIECE_LOW {
+            off[row] = min(to_low, 0.0);
         } else if kind == PIECE_HIGH {
-            off[row] = coordinates[row] - joints[slot].drives[axis].high;
+            off[row] = max(coordinates[row] - joints[slot].drives[axis].high, 0.0);
         }
     }
     return off;
@@ -375,7 +379,8 @@ fn keep_impulses(place: u32) {
 
 // What rows of a fixed impulse are still to give; others give nothing.
 fn fix(place: u32) {
-    for (var which = 0u; which < 2u; which++) {
+    for (var blocks = blocks_in_use(joint_works[place].axes); blocks != 0u; blocks &= blocks - 1u) {
+        let which = firstTrailingBit(blocks);
         let fixed = joint_works[place].rows[which].kinds == vec3<u32>(PIECE_FIXED);
         let more = joint_works[place].rows[which].goal - joint_works[place].rows[which].impulse;
         let push = select(vec3<f32>(), more, fixed);
@@ -394,7 +399,8 @@ struct Push {
 fn push_of(end: u32) -> Push {
     let place = end >> 1u;
     var push: Push;
-    for (var which = 0u; which < 2u; which++) {
+    for (var blocks = blocks_in_use(joint_works[place].axes); blocks != 0u; blocks &= blocks - 1u) {
+        let which = firstTrailingBit(blocks);
         let given = joint_works[place].rows[which].push;
         push.linear += joint_works[place].rows[which].along * given;
         if (end & 1u) == 1u {

@@ -9,9 +9,16 @@ const BODY_KIND: u32 = 3u;
 const BODY_FROZEN: u32 = 4u;
 const BODY_ASLEEP: u32 = 8u;
 const BODY_STAYS_AWAKE: u32 = 16u;
+const BODY_POSED: u32 = 32u;
+
+const LOCKED_TRANSLATIONS: u32 = 7u;
+const LOCKED_ROTATIONS: u32 = 56u;
+const LOCKED_FIRST_ROTATION: u32 = 3u;
 
 const TOUCHED_CONTACT: u32 = 1u;
 const TOUCHED_JOINED: u32 = 2u;
+const TOUCHED_ANY: u32 = 3u;
+const TOUCHED_FIRST_LOCK: u32 = 28u;
 
 struct BodyState {
     position: vec3<f32>,
@@ -37,8 +44,8 @@ struct BodyProps {
     frame: vec4<f32>,
     angular_damping: f32,
     reach: f32,
-    pad_b: u32,
-    pad_c: u32,
+    locked: u32,
+    least_level: u32,
 }
 
 struct Rest {
@@ -78,6 +85,21 @@ struct PoseRecord {
 // Whether contacts can push the body.
 fn moves(flags: u32) -> bool {
     return (flags & (BODY_KIND | BODY_FROZEN | BODY_ASLEEP)) == BODY_DYNAMIC;
+}
+
+// Which of three bits are set, `first` being the lowest.
+fn three_bits(word: u32, first: u32) -> vec3<bool> {
+    return (vec3<u32>(word >> first) & vec3<u32>(1u, 2u, 4u)) != vec3<u32>();
+}
+
+// Whether a body of these flags does not move along some axis.
+fn is_locked(touched: u32) -> bool {
+    return (touched >> TOUCHED_FIRST_LOCK) != 0u;
+}
+
+// What is left of a push on a body of these flags where axes are locked.
+fn along_free(touched: u32, push: vec3<f32>) -> vec3<f32> {
+    return select(push, vec3<f32>(), three_bits(touched, TOUCHED_FIRST_LOCK));
 }
 
 // Mass splitting: a part of a body, before any constraint of the last batch worked on it.

@@ -12,8 +12,9 @@ const EDIT_FORCE: u32 = 8u;
 const EDIT_FORCE_AT: u32 = 9u;
 const EDIT_FREEZE: u32 = 10u;
 const EDIT_WAKE: u32 = 11u;
-const EDIT_COLLIDER: u32 = 12u;
-const EDIT_COLLIDER_REMOVE: u32 = 13u;
+const EDIT_NEXT_POSE: u32 = 12u;
+const EDIT_COLLIDER: u32 = 13u;
+const EDIT_COLLIDER_REMOVE: u32 = 14u;
 
 struct EditRecord {
     op: u32,

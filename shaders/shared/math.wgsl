@@ -31,6 +31,20 @@ fn unit(q: vec4<f32>) -> vec4<f32> {
     return q / sqrt((q.x * q.x + q.z * q.z) + (q.y * q.y + q.w * q.w));
 }
 
+// The turn of a unit quaternion as its axis times its angle, of no more than pi, rad. The tangent of a sixteenth of it is
+// found by halves, and the angle from that by the arc tangent's series: WGSL promises its own to 4,096 last bits only.
+fn scaled_axis(q: vec4<f32>) -> vec3<f32> {
+    let axis = select(q.xyz, -q.xyz, q.w < 0.0);
+    let sine = dot(axis, axis);
+    // Each scale times the length of `axis` is a tangent: of a quarter, an eighth, a sixteenth of the angle.
+    let quarter = 1.0 / (1.0 + abs(q.w));
+    let eighth = quarter / (1.0 + sqrt(1.0 + sine * quarter * quarter));
+    let sixteenth = eighth / (1.0 + sqrt(1.0 + sine * eighth * eighth));
+    let s = sine * sixteenth * sixteenth;
+    let series = 1.0 - s * (1.0 / 3.0 - s * (1.0 / 5.0 - s * (1.0 / 7.0 - s * (1.0 / 9.0 - s * (1.0 / 11.0)))));
+    return axis * (16.0 * sixteenth * series);
+}
+
 // The matrix of a rotation: its columns are where the axes go.
 fn mat3_from_quat(q: vec4<f32>) -> mat3x3<f32> {
     let x2 = q.x + q.x;
@@ -49,6 +63,33 @@ fn mat3_from_quat(q: vec4<f32>) -> mat3x3<f32> {
         vec3<f32>(1.0 - (yy + zz), xy + wz, xz - wy),
         vec3<f32>(xy - wz, 1.0 - (xx + zz), yz + wx),
         vec3<f32>(xz + wy, yz - wx, 1.0 - (xx + yy)),
+    );
+}
+
+// The inverse of the inertia of a body that is held about the locked axes of the world, from its principal moments: that
+// of the rows and columns that are left, the others zero.
+fn held_inverse_inertia(rotation: vec4<f32>, inertia: vec3<f32>, locked: vec3<bool>) -> mat3x3<f32> {
+    // Over the largest moment, so that no product leaves the range of floats.
+    let largest = max(inertia.x, max(inertia.y, inertia.z));
+    let r = mat3_from_quat(rotation);
+    let x = r[0] * (inertia.x / largest);
+    let y = r[1] * (inertia.y / largest);
+    let z = r[2] * (inertia.z / largest);
+    let free = select(vec3<f32>(1.0), vec3<f32>(), locked);
+    // A locked axis has a moment of its own, and no product with the others.
+    let d = select(x * r[0] + y * r[1] + z * r[2], vec3<f32>(1.0), locked);
+    let o = (x.xxy * r[0].yzz + y.xxy * r[1].yzz + z.xxy * r[2].yzz) * free.xxy * free.yzz;
+    let xx = d.y * d.z - o.z * o.z;
+    let yy = d.x * d.z - o.y * o.y;
+    let zz = d.x * d.y - o.x * o.x;
+    let xy = o.y * o.z - o.x * d.z;
+    let xz = o.x * o.z - o.y * d.y;
+    let yz = o.x * o.y - o.z * d.x;
+    let scale = 1.0 / ((d.x * xx + o.x * xy + o.y * xz) * largest);
+    return mat3x3<f32>(
+        vec3<f32>(xx * free.x, xy, xz) * scale,
+        vec3<f32>(xy, yy * free.y, yz) * scale,
+        vec3<f32>(xz, yz, zz * free.z) * scale,
     );
 }
 

@@ -15,7 +15,11 @@ fn part_of(body: SolverBody) -> SolverBody {
 // How a body gives way at `r` to a unit impulse along `normal`.
 fn yield_of(body: ptr<function, SolverBody>, r: vec3<f32>, normal: vec3<f32>) -> f32 {
     let turn = cross(r, normal);
-    return (*body).inverse_mass + dot(turn, inverse_inertia_times(body, turn));
+    var moved = 1.0;
+    if is_locked((*body).touched) {
+        moved = dot(along_free((*body).touched, normal), normal);
+    }
+    return (*body).inverse_mass * moved + dot(turn, inverse_inertia_times(body, turn));
 }
 
 // Adds the change of velocity of one of `parts` parts to the mean.

@@ -105,8 +105,8 @@ fn start_after(
     a: ptr<function, SolverBody>,
     b: ptr<function, SolverBody>,
 ) {
-    (*a).linear_start = (*a).linear_start - (*a).inverse_mass * push;
+    (*a).linear_start = (*a).linear_start - (*a).inverse_mass * along_free((*a).touched, push);
     (*a).angular_start = (*a).angular_start - inverse_inertia_times(a, cross(r[0], push));
-    (*b).linear_start = (*b).linear_start + (*b).inverse_mass * push;
+    (*b).linear_start = (*b).linear_start + (*b).inverse_mass * along_free((*b).touched, push);
     (*b).angular_start = (*b).angular_start + inverse_inertia_times(b, cross(r[1], push));
 }

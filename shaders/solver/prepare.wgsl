@@ -39,12 +39,26 @@ const NO_RADIUS: f32 = 1e30; // m: more than any
 @group(0) @binding(15) var<storage, read_write> shares: array<u32>;
 @group(0) @binding(14) var<storage, read> slot_memory: array<ManifoldMemory>;
 
+// Neither velocity nor response along and about the locked axes.
+fn lock(i: u32, body: ptr<function, SolverBody>) {
+    let locked = props[i].locked;
+    let turns = three_bits(locked, LOCKED_FIRST_ROTATION);
+    (*body).touched |= (locked & LOCKED_TRANSLATIONS) << TOUCHED_FIRST_LOCK;
+    (*body).linear_velocity = select((*body).linear_velocity, vec3<f32>(), three_bits(locked, 0u));
+    (*body).angular_velocity = select((*body).angular_velocity, vec3<f32>(), turns);
+    if any(turns) {
+        let held = held_inverse_inertia(work_states[i].rotation, props[i].inertia, turns);
+        (*body).inverse_inertia_diagonal = vec3<f32>(held[0].x, held[1].y, held[2].z);
+        (*body).inverse_inertia_off = vec3<f32>(held[0].y, held[0].z, held[1].z);
+    }
+}
+
 // A body as the solver moves it; what nothing may push has no mass and keeps its velocity.
 fn prepare_body(i: u32) -> SolverBody {
     var body: SolverBody;
     body.linear_velocity = work_states[i].linear_velocity;
     body.angular_velocity = work_states[i].angular_velocity;
-    body.touched = select(0u, 1u, (masks[2u * i] | masks[2u * i + 1u]) != 0u);
+    body.touched = select(0u, TOUCHED_CONTACT, (masks[2u * i] | masks[2u * i + 1u]) != 0u);
     body.eigenvalue = work_states[i].eigenvalue;
     body.level = level_of(step.levels, work_states[i].credit);
     body.delta = vec4<f32>(0.0, 0.0, 0.0, 1.0);
@@ -58,6 +72,9 @@ fn prepare_body(i: u32) -> SolverBody {
         let z = r[2] * inertia.z;
         body.inverse_inertia_diagonal = x * r[0] + y * r[1] + z * r[2];
         body.inverse_inertia_off = x.xxy * r[0].yzz + y.xxy * r[1].yzz + z.xxy * r[2].yzz;
+        if props[i].locked != 0u {
+            lock(i, &body);
+        }
     }
     return body;
 }
@@ -109,7 +126,11 @@ fn response(
 ) -> f32 {
     let turn_a = cross(inverse_inertia_times(a, cross(ra, u)), ra);
     let turn_b = cross(inverse_inertia_times(b, cross(rb, u)), rb);
-    return (a.inverse_mass + b.inverse_mass) * dot(u, v) + dot(v, turn_a + turn_b);
+    var moved = (a.inverse_mass + b.inverse_mass) * dot(u, v);
+    if is_locked(a.touched | b.touched) {
+        moved = a.inverse_mass * dot(along_free(a.touched, u), v) + b.inverse_mass * dot(along_free(b.touched, u), v);
+    }
+    return moved + dot(v, turn_a + turn_b);
 }
 
 fn point_velocity(body: SolverBody, r: vec3<f32>) -> vec3<f32> {

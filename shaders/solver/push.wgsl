@@ -31,9 +31,9 @@ fn apply(
     rb: vec3<f32>,
     push: vec3<f32>,
 ) {
-    (*a).linear_velocity = (*a).linear_velocity - (*a).inverse_mass * push;
+    (*a).linear_velocity = (*a).linear_velocity - (*a).inverse_mass * along_free((*a).touched, push);
     (*a).angular_velocity = (*a).angular_velocity - inverse_inertia_times(a, cross(ra, push));
-    (*b).linear_velocity = (*b).linear_velocity + (*b).inverse_mass * push;
+    (*b).linear_velocity = (*b).linear_velocity + (*b).inverse_mass * along_free((*b).touched, push);
     (*b).angular_velocity = (*b).angular_velocity + inverse_inertia_times(b, cross(rb, push));
 }
 

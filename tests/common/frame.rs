@@ -66,7 +66,8 @@ pub(crate) fn scene_of(bodies: usize) -> Scene {
 }
 
 impl Cpu {
-    /// The scene, and in it something of everything: forces, damping, bounces, resistance, belts, kinematic and frozen bodies.
+    /// The scene, and in it something of everything: forces, damping, bounces, resistance, belts, locked axes, kinematic
+    /// and frozen bodies.
     pub(crate) fn new(scene: &Scene) -> Self {
         let packed = PackedScene::new(scene).unwrap();
         let mut cpu = Self {
@@ -95,6 +96,7 @@ impl Cpu {
             }
             props.linear_damping = if i % 11 == 5 { 0.3 } else { 0.0 };
             props.angular_damping = if i % 7 == 2 { 0.8 } else { 0.0 };
+            props.locked = if i % 6 == 4 { (i / 6) as u32 % 64 } else { 0 };
             if i % 41 == 20 {
                 state.flags = body_flags::KINEMATIC;
                 state.linear_velocity = [0.1, 0.02, -0.1];

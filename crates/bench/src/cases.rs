@@ -108,6 +108,14 @@ const RESIDUAL: Error = Error {
 const STANDING: &[Error] = &[SINK, DRIFT, DEEPEST, RESIDUAL];
 const HEAP: &[Error] = &[MEAN, DEEPEST, RESIDUAL];
 
+/// Farthest that any joint is from where it belongs, at the end.
+const SEPARATION: Error =
+    Error { name: "joint separation", unit: "m", of: |run| measures::joint_error(run.scene, run.poses).max_m };
+/// Its mean over the joints.
+const MEAN_SEPARATION: Error =
+    Error { name: "mean separation", unit: "m", of: |run| measures::joint_error(run.scene, run.poses).mean_m };
+const JOINED: &[Error] = &[SEPARATION, MEAN_SEPARATION];
+
 /// What a closed system must keep, of its beginning.
 fn angular_momentum_lost(run: &Run) -> f64 {
     let (poses, velocities) = (measures::initial_poses(run.scene), measures::initial_velocities(run.scene));
@@ -291,6 +299,68 @@ pub const ALL: &[Case] = &[
         about: "196 walls of 55 boxes: 10,780",
         scene: |_| scenes::many_pyramids(196, 10),
         seconds: 2.0,
+        ..CASE
+    },
+    Case {
+        name: "chain 20",
+        about: "14 links swing, the last 20 times as heavy",
+        scene: |_| scenes::chain(14, 20.0),
+        seconds: 2.0,
+        errors: JOINED,
+        fell: |run| (SEPARATION.of)(run) > 0.5,
+        ..CASE
+    },
+    Case {
+        name: "chain 100",
+        about: "15 links swing, the last 100 times as heavy",
+        scene: |_| scenes::chain(15, 100.0),
+        seconds: 2.0,
+        errors: JOINED,
+        fell: |run| (SEPARATION.of)(run) > 0.5,
+        ..CASE
+    },
+    Case {
+        name: "chain 1000",
+        about: "15 links swing, the last 1,000 times as heavy",
+        scene: |_| scenes::chain(15, 1000.0),
+        seconds: 2.0,
+        errors: JOINED,
+        fell: |run| (SEPARATION.of)(run) > 0.5,
+        ..CASE
+    },
+    Case {
+        name: "rope bridge",
+        about: "20 planks between two fixed ends",
+        scene: |_| scenes::rope_bridge(20),
+        errors: JOINED,
+        fell: |run| (SEPARATION.of)(run) > 0.5,
+        ..CASE
+    },
+    Case {
+        name: "net",
+        about: "10 x 10 balls, each joined to its neighbours, that hang by a corner",
+        scene: |_| scenes::net(10, 1.0),
+        seconds: 2.0,
+        errors: JOINED,
+        fell: |run| (SEPARATION.of)(run) > 1.0,
+        ..CASE
+    },
+    Case {
+        name: "ragdolls 100",
+        about: "100 ragdolls dropped into a pit",
+        scene: |seed| scenes::ragdolls_seeded(100, seed),
+        seconds: 5.0,
+        errors: &[SEPARATION, MEAN_SEPARATION, DEEPEST, MEAN, RESIDUAL],
+        fell: |run| (SEPARATION.of)(run) > 1.0,
+        ..CASE
+    },
+    Case {
+        name: "joint grid",
+        about: "100 x 100 balls, each joined to its neighbours: 10,000 bodies, 19,800 joints",
+        scene: |_| scenes::joint_grid(100),
+        seconds: 2.0,
+        errors: JOINED,
+        fell: |run| (SEPARATION.of)(run) > 1.0,
         ..CASE
     },
     Case {

@@ -136,11 +136,11 @@ impl WantedLevels {
         }
     }
 
-    /// Those that this step runs: what the one wanted whose report a GPU has by then. So no decision hangs on what has
-    /// arrived. The first steps run the highest, which new worlds want.
-    pub fn of(&self, step: &StepParams) -> u32 {
+    /// Those that this step runs: what the one wanted whose report a GPU has by then, so that no decision hangs on what has
+    /// arrived, and what bodies ask for. The first steps run the highest, which new worlds want.
+    pub fn of(&self, step: &StepParams, asked: u32) -> u32 {
         let known = self.0.iter().find(|(number, _)| number + STATUS_DELAY == step.step);
         let levels = known.map_or(1 << (LEVELS - 1), |(_, levels)| *levels).max(1);
-        if step.tolerance < 0.0 { 1 } else { levels }
+        asked | if step.tolerance < 0.0 { 1 } else { levels }
     }
 }

@@ -1,6 +1,7 @@
 //! Descriptions of bodies and colliders, with rapier's names.
 
 use crate::error::{Result, check};
+use crate::layout::LEVELS;
 use crate::shape::Shape;
 use glam::{Quat, Vec3};
 
@@ -11,6 +12,8 @@ pub enum RigidBodyType {
     Fixed,
     /// The velocity that the user sets, and nothing else.
     KinematicVelocityBased,
+    /// The poses that the user gives it, one a step.
+    KinematicPositionBased,
     /// Forces, impulses and contacts.
     Dynamic,
 }
@@ -36,6 +39,12 @@ pub struct RigidBodyBuilder {
     pub angular_damping: f32,
     /// Whether it may be put to sleep with its island, where the world has [`Params::sleep`](crate::Params::sleep).
     pub can_sleep: bool,
+    /// Along which of the world's axes it may move.
+    pub enabled_translations: [bool; 3],
+    /// About which of the world's axes it may turn.
+    pub enabled_rotations: [bool; 3],
+    /// How many times the usual sub-steps its island gets at least.
+    pub substep_factor: u32,
 }
 
 const FINITE: &str = "finite numbers";
@@ -78,6 +87,9 @@ impl RigidBodyBuilder {
             linear_damping: 0.0,
             angular_damping: 0.0,
             can_sleep: true,
+            enabled_translations: [true; 3],
+            enabled_rotations: [true; 3],
+            substep_factor: 1,
         }
     }
     /// A body that never moves.
@@ -91,6 +103,12 @@ impl RigidBodyBuilder {
     /// A body that keeps the velocity it is given and pushes what it meets.
     pub fn kinematic_velocity_based() -> Self {
         Self::new(RigidBodyType::KinematicVelocityBased)
+    }
+    /// A body that goes where [`Editor::set_next_kinematic_pose`](crate::Editor::set_next_kinematic_pose) tells it, within
+    /// the step, and pushes what it meets with the velocity that this takes. It stands still in steps for which nothing was
+    /// told.
+    pub fn kinematic_position_based() -> Self {
+        Self::new(RigidBodyType::KinematicPositionBased)
     }
     /// Origin of the body's frame in the world, m.
     pub fn translation(mut self, translation: Vec3) -> Self {
@@ -133,6 +151,54 @@ impl RigidBodyBuilder {
         self
     }
 
+    /// Along which of the world's axes a dynamic body may move; all at first. Along the others nothing moves it, and it has no
+    /// velocity there, whatever it is given: to what pushes it so, it is as heavy as the world. Bodies with locked axes cannot
+    /// be joined: a generic joint to a fixed body holds axes too.
+    pub fn enabled_translations(mut self, x: bool, y: bool, z: bool) -> Self {
+        self.enabled_translations = [x, y, z];
+        self
+    }
+    /// About which of the world's axes a dynamic body may turn; all at first. What holds the others is a torque without
+    /// work: a box that stands askew and may turn about y alone does so with the inertia that it has about y. (rapier
+    /// takes 1 / (I⁻¹)yy instead.) With an axis locked there is no gyroscopic torque: by itself, a body turns at a
+    /// constant rate.
+    pub fn enabled_rotations(mut self, x: bool, y: bool, z: bool) -> Self {
+        self.enabled_rotations = [x, y, z];
+        self
+    }
+    /// The centre of mass of a dynamic body stays where it is; it can turn. See
+    /// [`enabled_translations`](Self::enabled_translations).
+    pub fn lock_translations(self) -> Self {
+        self.enabled_translations(false, false, false)
+    }
+    /// A dynamic body never turns. See [`enabled_rotations`](Self::enabled_rotations).
+    pub fn lock_rotations(self) -> Self {
+        self.enabled_rotations(false, false, false)
+    }
+
+    /// The island that a dynamic body is in (bodies that hang together by contacts and joints) gets this many times the
+    /// sub-steps of [`Params::accuracy`](crate::Params::accuracy): 1, 2, 4 or 8; 1 at first. Of several in an island the
+    /// highest counts. With [`Accuracy::Tolerance`](crate::Accuracy::Tolerance) it is a minimum: times an eighth of `most`.
+    /// Who asks for nothing pays nothing, and gets the same bits as without.
+    ///
+    /// rapier's `additional_solver_iterations` adds to the iterations instead: that of 4 in a world of 4 is 2 here. (A
+    /// factor keeps the lengths of sub-steps powers of two apart, so that islands can run by themselves.)
+    pub fn substep_factor(mut self, factor: u32) -> Self {
+        self.substep_factor = factor;
+        self
+    }
+
+    /// The level of sub-steps that is meant by the factor.
+    pub(crate) fn least_level(&self) -> u32 {
+        if self.body_type == RigidBodyType::Dynamic { self.substep_factor.max(1).ilog2() } else { 0 }
+    }
+
+    /// [`layout::locks`](crate::layout::locks).
+    pub(crate) fn locked(&self) -> u32 {
+        let all = self.enabled_translations.into_iter().chain(self.enabled_rotations);
+        all.enumerate().map(|(bit, enabled)| u32::from(!enabled) << bit).sum()
+    }
+
     pub(crate) fn validate(&self, what: &impl Fn() -> String) -> Result<()> {
         check_position(self.translation, what, "translation")?;
         check_rotation(self.rotation, what, "rotation")?;
@@ -140,6 +206,9 @@ impl RigidBodyBuilder {
         check_speed(self.angvel, what, "angvel")?;
         let scale = self.gravity_scale;
         check(scale.is_finite() && scale.abs() <= 1e6, what, "gravity_scale", scale, "finite numbers up to 1e6")?;
+        let factor = self.substep_factor;
+        let is_level = factor.is_power_of_two() && factor.ilog2() < LEVELS;
+        check(is_level, what, "substep_factor", factor, "1, 2, 4 or 8")?;
         const DAMPING: &str = "finite numbers from 0 to 1e6, 1/s";
         let damps = |d: f32| (0.0..=1e6).contains(&d);
         check(damps(self.linear_damping), what, "linear_damping", self.linear_damping, DAMPING)?;

@@ -221,13 +221,29 @@ impl Editor {
     /// Puts the body's own frame somewhere else.
     pub fn set_pose(&mut self, body: BodyHandle, pose: Pose) -> Result<()> {
         self.scene.entry(body)?;
-        check_position(pose.translation, || body.to_string(), "translation")?;
-        check_rotation(pose.rotation, || body.to_string(), "rotation")?;
-        self.push(edit_op::POSE, body, pose.translation.extend(0.0).to_array(), pose.rotation.normalize().to_array());
-        Ok(())
+        self.push_pose(edit_op::POSE, body, pose)
     }
 
-    /// Sets the velocity of the centre of mass (m/s) and the angular velocity (rad/s, world axes).
+    /// Where a body of [`RigidBodyBuilder::kinematic_position_based`] is to be at the end of the next step: its own frame.
+    /// Within the step it has the velocity that leads there: the way over `dt`, and the turn, of no more than pi, over `dt`.
+    /// Contacts see it, and [`Velocities`](crate::Velocities) tell it. In steps for which nothing is set it stands still.
+    ///
+    /// Of several for one step the last one counts. A velocity beyond 1e9 (m/s, rad/s) puts the body in quarantine; to
+    /// put it somewhere at once, without a velocity, take [`set_pose`](Self::set_pose).
+    ///
+    /// # Errors
+    /// [`Error::Invalid`](crate::Error::Invalid) for a body of another type, a translation beyond 1e7 m or not finite, and a
+    /// rotation that is none; [`Error::StaleBody`](crate::Error::StaleBody).
+    pub fn set_next_kinematic_pose(&mut self, body: BodyHandle, pose: Pose) -> Result<()> {
+        let kind = self.scene.body(body)?.body_type;
+        const KIND: &str = "KinematicPositionBased (`RigidBodyBuilder::kinematic_position_based`); others are put somewhere \
+                            by `set_pose`";
+        check(kind == RigidBodyType::KinematicPositionBased, || body.to_string(), "body_type", kind, KIND)?;
+        self.push_pose(edit_op::NEXT_POSE, body, pose)
+    }
+
+    /// Sets the velocity of the centre of mass (m/s) and the angular velocity (rad/s, world axes). A kinematic body that is
+    /// moved by poses keeps it for one step.
     pub fn set_velocity(&mut self, body: BodyHandle, linear: Vec3, angular: Vec3) -> Result<()> {
         self.scene.entry(body)?;
         check_speed(linear, || body.to_string(), "linear velocity")?;
@@ -366,6 +382,13 @@ impl Editor {
             Ok(builder) if builder.body_type == RigidBodyType::Fixed => self.stale.fixed = true,
             _ => self.stale.moving |= members,
         }
+    }
+
+    fn push_pose(&mut self, op: u32, body: BodyHandle, pose: Pose) -> Result<()> {
+        check_position(pose.translation, || body.to_string(), "translation")?;
+        check_rotation(pose.rotation, || body.to_string(), "rotation")?;
+        self.push(op, body, pose.translation.extend(0.0).to_array(), pose.rotation.normalize().to_array());
+        Ok(())
     }
 
     fn push(&mut self, op: u32, body: BodyHandle, a: [f32; 4], b: [f32; 4]) {

@@ -75,13 +75,14 @@ pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<PackedBody> {
         }
     };
     let rotation = builder.rotation.normalize();
+    let still = matches!(builder.body_type, RigidBodyType::Fixed | RigidBodyType::KinematicPositionBased);
     let state = BodyState {
         position: (builder.translation + rotation * mass.center_of_mass).to_array(),
         flags: body_kind(builder.body_type) | if dynamic && !builder.can_sleep { body_flags::STAYS_AWAKE } else { 0 },
         rotation: (rotation * mass.principal_frame).normalize().to_array(),
-        linear_velocity: if builder.body_type == RigidBodyType::Fixed { [0.0; 3] } else { builder.linvel.to_array() },
+        linear_velocity: if still { [0.0; 3] } else { builder.linvel.to_array() },
         generation: body.generation(),
-        angular_velocity: if builder.body_type == RigidBodyType::Fixed { [0.0; 3] } else { builder.angvel.to_array() },
+        angular_velocity: if still { [0.0; 3] } else { builder.angvel.to_array() },
         credit: MOST_CREDIT,
         ..BodyState::zeroed()
     };
@@ -125,7 +126,8 @@ pub(crate) fn pack_body(scene: &Scene, body: BodyHandle) -> Result<PackedBody> {
         frame: mass.principal_frame.to_array(),
         angular_damping: builder.angular_damping,
         reach,
-        ..BodyProps::zeroed()
+        locked: builder.locked(),
+        least_level: builder.least_level(),
     };
     Ok(PackedBody { state, props, colliders })
 }
@@ -223,6 +225,7 @@ fn body_kind(body_type: RigidBodyType) -> u32 {
     match body_type {
         RigidBodyType::Fixed => body_flags::FIXED,
         RigidBodyType::KinematicVelocityBased => body_flags::KINEMATIC,
+        RigidBodyType::KinematicPositionBased => body_flags::KINEMATIC | body_flags::POSED,
         RigidBodyType::Dynamic => body_flags::DYNAMIC,
     }
 }

@@ -22,6 +22,8 @@ pub struct Plan {
     pub sleep: bool,
     /// Islands have sub-steps of their own.
     pub levels: bool,
+    /// Bit l where some body asks for level l of sub-steps, the lowest excepted.
+    pub asked_levels: u32,
     /// The last batch is solved by mass splitting.
     pub split: bool,
     /// Bodies are joined.
@@ -51,13 +53,16 @@ impl Plan {
         allow(cuboids > 1, pair_kind::CUBOID_CUBOID);
         allow(balls > 0 && halfspaces > 0, pair_kind::BALL_HALFSPACE);
         allow(cuboids > 0 && halfspaces > 0, pair_kind::CUBOID_HALFSPACE);
+        let levels = scene.bodies.iter().map(|(_, _, body)| body.builder.least_level()).filter(|&level| level > 0);
+        let asked_levels = levels.fold(0, |asked, level| asked | 1 << level);
         let fixed = if fixed > 0 { fixed.next_power_of_two() } else { 0 };
         Self {
             pair_kinds,
             restitution,
             fixed,
             sleep: false,
-            levels: false,
+            levels: asked_levels != 0,
+            asked_levels,
             split: false,
             joints: scene.joint_count() > 0,
         }
@@ -71,6 +76,7 @@ impl Plan {
         self.fixed = self.fixed.max(other.fixed);
         self.sleep |= other.sleep;
         self.levels |= other.levels;
+        self.asked_levels |= other.asked_levels;
         self.split |= other.split;
         self.joints |= other.joints;
         *self != before

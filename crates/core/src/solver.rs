@@ -246,8 +246,9 @@ impl Solver {
                 Law {
                     spring,
                     fixed: spring,
-                    memory_gain: on * memory_pace(h) * MEMORY_SHARE / leak,
-                    memory_limit: on * memory_pace(h) * MEMORY_LIMIT,
+                    // Last the factor that levels of sub-steps change: so they round as a world of their sub-steps does.
+                    memory_gain: on * MEMORY_SHARE / leak * memory_pace(h),
+                    memory_limit: on * MEMORY_LIMIT * memory_pace(h),
                     memory_band: on * MEMORY_BAND * h / stiffness,
                     ..Law::default()
                 }

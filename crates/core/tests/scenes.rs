@@ -35,7 +35,15 @@ fn every_standard_scene_has_the_bodies_asked_for() {
                 let base = (0..).take_while(|b| b * (b + 1) / 2 <= bodies).last().unwrap();
                 assert_eq!(found, base * (base + 1) / 2);
             } else {
-                assert_eq!(found, bodies, "{}", standard.name);
+                // Nets are square, and of the others no half is built.
+                let most = match standard.name {
+                    "net" | "joint_grid" => bodies.isqrt().pow(2),
+                    "ragdolls" => bodies / scenes::RAGDOLL_BODIES * scenes::RAGDOLL_BODIES,
+                    "four_bars" => bodies / 3 * 3,
+                    "cars" => bodies / scenes::CAR_BODIES * scenes::CAR_BODIES,
+                    _ => bodies,
+                };
+                assert_eq!(found, most, "{}", standard.name);
             }
             assert!(overlap(&scene) <= 1e-6, "{} of {bodies}: {:e} m", standard.name, overlap(&scene));
         }
@@ -210,6 +218,22 @@ fn small_scenes_pack_and_hand_back_their_bodies() {
     let inertia = scene.mass_properties(body).unwrap().principal_inertia;
     assert!((inertia - Vec3::new(13.0, 10.0, 5.0) * 500.0).length() < 0.01, "m / 12 (b² + c²), m = 6,000 kg");
     assert_eq!(initial_velocities(&scene)[body].angular, Vec3::new(3.0, 7.0, 2.0));
+
+    let (scene, body) = scenes::tumbling_box();
+    let inertia = scene.mass_properties(body).unwrap().principal_inertia;
+    assert!((inertia - Vec3::new(1.06, 0.85, 0.29) * 7.5).length() < 1e-3, "m / 12 (b² + c²), m = 90 kg");
+    assert_eq!(initial_velocities(&scene)[body].angular, Vec3::new(0.08, 8.0, 0.08));
+    let (scene, body) = scenes::t_handle();
+    let mass = scene.mass_properties(body).unwrap();
+    // The bar about x, y, z and the handle, a cylinder of 0.6 m and radius 0.15 m, 0.4 m from it.
+    let (bar, handle) = (40.0f32, 0.6 * 3.0 * 0.15 * 0.15 * 1000.0);
+    let apart = bar * handle / (bar + handle) * 0.16;
+    let across = handle * (3.0 * 0.0225 + 0.36) / 12.0 + apart;
+    let exact =
+        Vec3::new(bar * 0.05 / 12.0 + across, bar * 4.04 / 12.0 + across, bar * 4.01 / 12.0 + handle * 0.0225 / 2.0);
+    let mut found = mass.principal_inertia.to_array();
+    found.sort_by(f32::total_cmp);
+    assert!((Vec3::from_array(found) - Vec3::new(exact.x, exact.z, exact.y)).length() < 1e-2, "{found:?}, {exact}");
 
     for gap in [0.0, 1e-3] {
         let (scene, balls) = scenes::cradle(1.0, gap);

@@ -1,12 +1,14 @@
 //! Stage `edit`: the records of a step are applied to the working copy of the states. Twin of `shaders/edit.wgsl`.
 //!
-//! `begin` copies the committed states, `apply` runs one range of records, those of one body or collider. Writes to
+//! `begin` copies a committed state, `apply` runs one range of records, those of one body or collider. Writes to
 //! properties and colliders are absolute, so that a step that is run again finds what it would have found.
 
 use crate::bounds::STATE_LIMIT;
-use crate::math::{finite, quat, rotate, rotate_back, vec3};
+use crate::math::{finite, free, held_inverse_inertia, quat, rotate, rotate_back, scaled_axis, symmetric_times, vec3};
 use glam::{Quat, Vec3};
-use tumble_core::layout::{BodyProps, BodyState, Collider, EditRange, EditRecord, body_flags, edit_op};
+use tumble_core::layout::{
+    BodyProps, BodyState, Collider, EditRange, EditRecord, StepParams, body_flags, edit_op, locks,
+};
 
 /// What edits may change.
 pub struct Targets<'a> {
@@ -18,14 +20,24 @@ pub struct Targets<'a> {
     pub colliders: &'a mut [Collider],
 }
 
+/// The working copy of a committed state: what is moved by poses stands still until it is given one.
+pub fn begin(state: &BodyState) -> BodyState {
+    let mut state = *state;
+    if state.flags & body_flags::POSED != 0 {
+        state.linear_velocity = [0.0; 3];
+        state.angular_velocity = [0.0; 3];
+    }
+    state
+}
+
 /// Applies the records of one body or one collider, in order.
-pub fn apply(range: EditRange, records: &[EditRecord], step: u32, targets: &mut Targets<'_>) {
+pub fn apply(range: EditRange, records: &[EditRecord], step: &StepParams, targets: &mut Targets<'_>) {
     for record in &records[range.first as usize..(range.first + range.count) as usize] {
         let slot = record.target as usize;
         if record.op >= edit_op::COLLIDER {
-            apply_to_collider(record, step, &mut targets.colliders[slot]);
+            apply_to_collider(record, step.step, &mut targets.colliders[slot]);
         } else {
-            apply_to_body(record, &mut targets.states[slot], &mut targets.props[slot]);
+            apply_to_body(record, step, &mut targets.states[slot], &mut targets.props[slot]);
         }
     }
 }
@@ -37,7 +49,7 @@ fn apply_to_collider(record: &EditRecord, step: u32, collider: &mut Collider) {
     collider.born = step;
 }
 
-fn apply_to_body(record: &EditRecord, state: &mut BodyState, props: &mut BodyProps) {
+fn apply_to_body(record: &EditRecord, step: &StepParams, state: &mut BodyState, props: &mut BodyProps) {
     let a = xyz(record.data[0]);
     let b = xyz(record.data[1]);
     match record.op {
@@ -78,6 +90,13 @@ fn apply_to_body(record: &EditRecord, state: &mut BodyState, props: &mut BodyPro
         edit_op::FORCE => pull(state, props, a, b),
         edit_op::FORCE_AT => pull(state, props, a, (b - vec3(state.position)).cross(a)),
         edit_op::WAKE => {}
+        edit_op::NEXT_POSE => {
+            let own = xyzw(record.data[1]);
+            let position = a + rotate(own, vec3(props.center_of_mass));
+            let turn = (own * quat(props.frame)).normalize() * quat(state.rotation).conjugate();
+            state.linear_velocity = ((position - vec3(state.position)) / step.dt).to_array();
+            state.angular_velocity = (scaled_axis(turn) / step.dt).to_array();
+        }
         _ => {
             state.flags |= body_flags::FROZEN;
             state.linear_velocity = [0.0; 3];
@@ -86,11 +105,16 @@ fn apply_to_body(record: &EditRecord, state: &mut BodyState, props: &mut BodyPro
     }
 }
 
-/// Adds an impulse and an angular impulse.
+/// Adds an impulse and an angular impulse. (Along locked axes velocities are taken away before they are looked at.)
 fn push(state: &mut BodyState, props: &BodyProps, impulse: Vec3, angular: Vec3) {
     let q = quat(state.rotation);
     let linear = vec3(state.linear_velocity) + props.inverse_mass * impulse;
-    let turn = rotate(q, vec3(props.inverse_inertia) * rotate_back(q, angular));
+    let turn = if props.locked & locks::ROTATIONS == 0 {
+        rotate(q, vec3(props.inverse_inertia) * rotate_back(q, angular))
+    } else {
+        let free = free(props.locked, locks::FIRST_ROTATION);
+        symmetric_times(held_inverse_inertia(q, vec3(props.inertia), free), angular)
+    };
     state.linear_velocity = linear.to_array();
     state.angular_velocity = (vec3(state.angular_velocity) + turn).to_array();
 }

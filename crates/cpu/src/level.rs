@@ -2,14 +2,16 @@
 //!
 //! What the last step left is measured where this one finds its contacts: the deepest overlap of each island, and the
 //! widest separation of its joints. Where either is more than its tolerance the island wants the next level, which has
-//! twice the sub-steps; after some calm steps, the one below. Bodies keep what their islands want, so that islands may meet and part: the most wanted counts.
+//! twice the sub-steps; after some calm steps, the one below. Bodies keep what their islands want, so that islands may meet
+//! and part: the most wanted counts. And no island gets less than any of its bodies asks for (`BodyProps::least_level`);
+//! without a tolerance that is all it gets.
 
 use crate::batch::{Ends, NO_BODY};
 use crate::island::NO_ISLAND;
 use crate::joint::is_of;
 use tumble_core::JointSet;
 use tumble_core::layout::{
-    BodyState, Control, JointState, LEVEL_CALM, LEVEL_HOLD, MOST_CREDIT, Manifold, StepParams, joint_bits,
+    BodyProps, BodyState, Control, JointState, LEVEL_CALM, LEVEL_HOLD, MOST_CREDIT, Manifold, StepParams, joint_bits,
 };
 
 /// What stands for the overlap of contacts and joints that have none, m; 0 is that of an island without any.
@@ -17,7 +19,7 @@ pub const NO_OVERLAP: f32 = 1e-30;
 
 /// What an island wants that wanted `credit` and has this overlap, m; the separation of joints counts as overlap.
 pub fn next_credit(credit: u32, overlap: f32, tolerance: f32) -> u32 {
-    if overlap == 0.0 {
+    if overlap == 0.0 || tolerance < 0.0 {
         0
     } else if overlap > tolerance {
         ((credit / LEVEL_HOLD + 2) * LEVEL_HOLD - 1).min(MOST_CREDIT)
@@ -74,6 +76,7 @@ impl Held<'_> {
 /// Decides for each island. Credits are in `states` before and after; `labels` and contacts are those of the step.
 pub fn decide(
     states: &mut [BodyState],
+    props: &[BodyProps],
     labels: &[u32],
     touching: &Touching<'_>,
     held: &Held<'_>,
@@ -81,9 +84,11 @@ pub fn decide(
     control: &mut Control,
 ) {
     let mut overlaps = vec![0.0f32; states.len()];
-    let mut credits = vec![0; states.len()];
-    for (state, &label) in states.iter().zip(labels).filter(|(_, label)| **label != NO_ISLAND) {
+    let (mut credits, mut leasts) = (vec![0; states.len()], vec![0; states.len()]);
+    let bodies = states.iter().zip(props).zip(labels);
+    for ((state, props), &label) in bodies.filter(|(_, label)| **label != NO_ISLAND) {
         credits[label as usize] = state.credit.max(credits[label as usize]);
+        leasts[label as usize] = props.least_level.max(leasts[label as usize]);
     }
     let (mut deepest, mut widest) = (0.0f32, 0.0f32);
     let contacts = || touching.manifolds.iter().zip(touching.ends);
@@ -102,10 +107,11 @@ pub fn decide(
     }
     for (state, &label) in states.iter_mut().zip(labels).filter(|(_, label)| **label != NO_ISLAND) {
         let overlap = overlaps[label as usize];
-        state.credit = next_credit(credits[label as usize], overlap, step.tolerance);
+        let least = LEVEL_HOLD * leasts[label as usize];
+        state.credit = next_credit(credits[label as usize], overlap, step.tolerance).max(least);
         control.levels_wanted |= 1 << (state.credit / LEVEL_HOLD);
         control.levels_used |= 1 << step.level_of(state.credit);
-        control.bodies_over += u32::from(overlap > step.tolerance);
+        control.bodies_over += u32::from(step.tolerance >= 0.0 && overlap > step.tolerance);
     }
     let touching = contacts().filter_map(|(manifold, ends)| moving_body(manifold, *ends));
     for body in touching.chain(held.each(labels).map(|(body, _)| body)) {

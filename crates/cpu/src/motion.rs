@@ -1,10 +1,10 @@
 //! Stage `motion`: bodies move; the step's result becomes the state. Twin of `shaders/motion.wgsl`.
 
 use crate::bounds::{STATE_LIMIT, moves};
-use crate::math::{finite, quat, rotate, rotate_back, vec3};
+use crate::math::{finite, quat, rotate, rotate_back, unlocked, vec3};
 use crate::solver::one_pass::ease;
 use glam::{Quat, Vec3};
-use tumble_core::layout::{BodyProps, BodyState, SolverBody, StepParams, body_flags, touched};
+use tumble_core::layout::{BodyProps, BodyState, SolverBody, StepParams, body_flags, locks, touched};
 
 /// Largest turn of a body in a sub-step, rad; it bounds the number of pieces of a turn.
 pub const MAX_TURN: f32 = 32.0;
@@ -12,9 +12,10 @@ pub const MAX_TURN: f32 = 32.0;
 /// Flags of a body that stands still, whatever its kind.
 const STILL: u32 = body_flags::FROZEN | body_flags::ASLEEP;
 
-/// Acceleration by gravity and force, m/s².
+/// Acceleration by gravity and force, m/s²; none along locked axes.
 fn acceleration(state: &BodyState, props: &BodyProps, step: &StepParams) -> Vec3 {
-    vec3(step.gravity) * props.gravity_scale + vec3(state.force) * props.inverse_mass
+    let all = vec3(step.gravity) * props.gravity_scale + vec3(state.force) * props.inverse_mass;
+    unlocked(all, props.locked, 0)
 }
 
 /// Gravity, force, torque and damping over one sub-step.
@@ -113,8 +114,14 @@ pub fn integrate_position(body: &mut SolverBody, state: &BodyState, props: &Body
     if kind == body_flags::NONE || kind == body_flags::FIXED || state.flags & STILL != 0 {
         return;
     }
+    if props.locked != 0 && moves(state.flags) {
+        // Whatever pushed it.
+        body.linear_velocity = unlocked(vec3(body.linear_velocity), props.locked, 0).to_array();
+        let turns = unlocked(vec3(body.angular_velocity), props.locked, locks::FIRST_ROTATION);
+        body.angular_velocity = turns.to_array();
+    }
     let mut way = vec3(body.linear_velocity) * step.h;
-    if body.touched == 0 && kind == body_flags::DYNAMIC {
+    if body.touched & touched::ANY == 0 && kind == body_flags::DYNAMIC {
         way -= acceleration(state, props, step) * (0.5 * step.h * step.h);
     }
     body.translation = (vec3(body.translation) + way).to_array();
@@ -139,8 +146,10 @@ fn turn(body: &mut SolverBody, state: &BodyState, props: &BodyProps, h: f32) {
     let pieces = angle.ceil().max(1.0);
     let piece = h / pieces;
     let mut delta = quat(body.delta);
-    // Kinematic bodies and round ones turn at a constant rate.
-    let steady = !moves(state.flags) || (inertia.max_element() - inertia.min_element()) <= 1e-6 * inertia.max_element();
+    // Kinematic bodies, round ones and those held about an axis turn at a constant rate.
+    let held = props.locked & locks::ROTATIONS != 0;
+    let round = inertia.max_element() - inertia.min_element() <= 1e-6 * inertia.max_element();
+    let steady = !moves(state.flags) || round || held;
     for _ in 0..pieces as u32 {
         if steady {
             delta = (half_turn(angular, piece) * delta).normalize();

@@ -91,7 +91,7 @@ impl Instances {
 fn color(kind: RigidBodyType, slot: usize) -> [u8; 3] {
     match kind {
         RigidBodyType::Fixed => FIXED,
-        RigidBodyType::KinematicVelocityBased => KINEMATIC,
+        RigidBodyType::KinematicVelocityBased | RigidBodyType::KinematicPositionBased => KINEMATIC,
         RigidBodyType::Dynamic => {
             let hash = mix(slot as u32);
             let light = 0.92 + 0.08 * ((hash & 255) as f32 / 255.0);

@@ -62,7 +62,7 @@ fn records(scene: &Scene, poses: &Poses) -> Vec<PoseRecord> {
         let (Ok(pose), Ok(builder)) = (poses.get(body), scene.body(body)) else { continue };
         let kind = match builder.body_type {
             RigidBodyType::Fixed => body_flags::FIXED,
-            RigidBodyType::KinematicVelocityBased => body_flags::KINEMATIC,
+            RigidBodyType::KinematicVelocityBased | RigidBodyType::KinematicPositionBased => body_flags::KINEMATIC,
             RigidBodyType::Dynamic => body_flags::DYNAMIC,
         };
         records[body.slot()] = PoseRecord {

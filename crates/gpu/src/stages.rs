@@ -37,7 +37,7 @@ pub(crate) struct Stages {
     sleep: Option<Sleep>,
     /// Where something asks which bodies hang together.
     island: Option<Island>,
-    /// Where accuracy is on demand.
+    /// Where islands have sub-steps of their own.
     level: Option<Level>,
     batch: Batch,
     solver: Solver,
@@ -95,7 +95,7 @@ impl Stages {
         if let Some(sleep) = self.sleep.as_ref().filter(|_| may_sleep) {
             sleep.record_touch(recorder, step, self.contact.a_pair())?;
         }
-        let leveled = step.tolerance >= 0.0;
+        let leveled = step.is_leveled();
         if let Some(island) = self.island.as_ref().filter(|_| may_sleep || leveled) {
             island.record(recorder, step, self.contact.a_pair(), joined)?;
         }

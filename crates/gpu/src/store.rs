@@ -72,7 +72,7 @@ enum Per {
 }
 
 /// Name, bytes of an element, what it follows, whether its content outlives a step.
-const ARRAYS: [(&str, usize, Per, bool); 39] = [
+const ARRAYS: [(&str, usize, Per, bool); 40] = [
     ("states", size_of::<BodyState>(), Per::Body, true),
     ("work_states", size_of::<BodyState>(), Per::Body, false),
     ("props", size_of::<BodyProps>(), Per::Body, true),
@@ -83,6 +83,7 @@ const ARRAYS: [(&str, usize, Per, bool); 39] = [
     ("claims", 4, Per::Body, false),
     ("islands", 4, Per::Island, false),
     ("island_credits", 4, Per::Island, false),
+    ("island_leasts", 4, Per::Island, false),
     ("island_overlaps", 4, Per::Island, false),
     ("stirs", 4, Per::Island, false),
     ("rests", size_of::<Rest>(), Per::Island, true),

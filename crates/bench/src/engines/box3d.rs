@@ -23,6 +23,7 @@ fn back(v: Vec3) -> glam::Vec3 {
 }
 
 pub(super) fn make(scene: &Scene, setting: &Setting, _: &Means) -> Result<Box<dyn Engine>, Refusal> {
+    super::without_joints(scene)?;
     build(scene, setting).map(|world| Box::new(world) as Box<dyn Engine>).map_err(|e| Refusal::Failed(e.to_string()))
 }
 
@@ -38,7 +39,7 @@ fn build(scene: &Scene, setting: &Setting) -> boxddd::Result<Box3d> {
         let b = scene.body(handle).expect("a living body");
         let kind = match b.body_type {
             RigidBodyType::Fixed => BodyType::Static,
-            RigidBodyType::KinematicVelocityBased => BodyType::Kinematic,
+            RigidBodyType::KinematicVelocityBased | RigidBodyType::KinematicPositionBased => BodyType::Kinematic,
             RigidBodyType::Dynamic => BodyType::Dynamic,
         };
         let definition = foundation

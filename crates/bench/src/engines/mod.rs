@@ -277,6 +277,11 @@ pub const DIFFERS: &[(&str, &str)] = &[
     ),
 ];
 
+/// Refuses a scene with joints, for engines that are not told of them.
+fn without_joints(scene: &Scene) -> Result<(), Refusal> {
+    if scene.joint_count() == 0 { Ok(()) } else { Err(Refusal::Unmodelled("joints".into())) }
+}
+
 /// Half the edge of a box that stands for a half-space in an engine without them, m: it reaches well past every body.
 fn half_space_edge(scene: &Scene) -> f32 {
     let far = scene.bodies().filter_map(|b| scene.body(b).ok()).map(|b| b.translation.abs().max_element());

@@ -3,7 +3,8 @@
 use super::{Engine, Facts, Means, Refusal, Setting, timed};
 use rapier3d::prelude as r;
 use tumble_core::{
-    Accuracy, BodyHandle, CombineRule, Params, Pose, Poses, RigidBodyType, Scene, Shape, Velocities, Velocity,
+    Accuracy, BodyHandle, CombineRule, JointBuilder, MotorModel, Params, Pose, Poses, RigidBodyType, Scene, Shape,
+    Velocities, Velocity,
 };
 
 /// A scene in rapier, with sleep off.
@@ -19,6 +20,54 @@ fn rule(rule: CombineRule) -> r::CoefficientCombineRule {
         CombineRule::Multiply => r::CoefficientCombineRule::Multiply,
         CombineRule::Max => r::CoefficientCombineRule::Max,
     }
+}
+
+/// Rapier has no dry friction in joints: a motor that wants to stand still, no stronger than that, is the same where the
+/// axis has no other motor. Joints break in none of its.
+fn joint(builder: &JointBuilder) -> r::GenericJoint {
+    let pose = |anchor, rotation: glam::Quat| r::Pose::from_parts(anchor, rotation.normalize());
+    let mut joint = r::GenericJoint {
+        local_frame1: pose(builder.local_anchor1, builder.local_rotation1),
+        local_frame2: pose(builder.local_anchor2, builder.local_rotation2),
+        contacts_enabled: builder.contacts_enabled,
+        ..r::GenericJoint::default()
+    };
+    if builder.coupled {
+        joint.coupled_axes = r::JointAxesMask::LIN_AXES;
+    }
+    if let Some(softness) = builder.softness {
+        joint.softness =
+            r::SpringCoefficients { natural_frequency: softness.frequency, damping_ratio: softness.damping_ratio };
+    }
+    let axes = [
+        r::JointAxis::LinX,
+        r::JointAxis::LinY,
+        r::JointAxis::LinZ,
+        r::JointAxis::AngX,
+        r::JointAxis::AngY,
+        r::JointAxis::AngZ,
+    ];
+    for (i, axis) in axes.into_iter().enumerate() {
+        if builder.locked[i] {
+            joint.lock_axes(axis.into());
+        }
+        if let Some(limits) = builder.limits[i] {
+            joint.set_limits(axis, limits);
+        }
+        if let Some(motor) = builder.motors[i] {
+            let model = match motor.model {
+                MotorModel::AccelerationBased => r::MotorModel::AccelerationBased,
+                MotorModel::ForceBased => r::MotorModel::ForceBased,
+            };
+            joint.set_motor(axis, motor.target_pos, motor.target_vel, motor.stiffness, motor.damping);
+            joint.set_motor_model(axis, model);
+            joint.set_motor_max_force(axis, motor.max_force.min(f32::MAX));
+        } else if builder.friction[i] > 0.0 {
+            joint.set_motor(axis, 0.0, 0.0, 0.0, 1e6);
+            joint.set_motor_max_force(axis, builder.friction[i]);
+        }
+    }
+    joint
 }
 
 impl RapierWorld {
@@ -37,6 +86,7 @@ impl RapierWorld {
             let builder = match b.body_type {
                 RigidBodyType::Fixed => r::RigidBodyBuilder::fixed(),
                 RigidBodyType::KinematicVelocityBased => r::RigidBodyBuilder::kinematic_velocity_based(),
+                RigidBodyType::KinematicPositionBased => r::RigidBodyBuilder::kinematic_position_based(),
                 RigidBodyType::Dynamic => r::RigidBodyBuilder::dynamic(),
             };
             let body = world.bodies.insert(
@@ -47,7 +97,14 @@ impl RapierWorld {
                     .gravity_scale(b.gravity_scale)
                     .linear_damping(b.linear_damping)
                     .angular_damping(b.angular_damping)
-                    .can_sleep(false),
+                    .can_sleep(false)
+                    .additional_solver_iterations((b.substep_factor as usize - 1) * params.accuracy.fewest() as usize)
+                    .enabled_translations(
+                        b.enabled_translations[0],
+                        b.enabled_translations[1],
+                        b.enabled_translations[2],
+                    )
+                    .enabled_rotations(b.enabled_rotations[0], b.enabled_rotations[1], b.enabled_rotations[2]),
             );
             for (_, c) in scene.colliders_of(handle).expect("a living body") {
                 let shape = match c.shape {
@@ -69,6 +126,11 @@ impl RapierWorld {
                 world.colliders.insert_with_parent(collider, body, &mut world.bodies);
             }
             bodies.push((handle, body));
+        }
+        for handle in scene.joints() {
+            let (builder, joined) = (scene.joint(handle).expect("living"), scene.joined(handle).expect("living"));
+            let [a, b] = joined.map(|body| bodies[bodies.partition_point(|(h, _)| *h < body)].1);
+            world.insert_impulse_joint(a, b, joint(builder));
         }
         Self { world, bodies }
     }

@@ -75,6 +75,7 @@ fn load(
     solver: &str,
     options: Value,
 ) -> Result<Box<dyn Engine>, Refusal> {
+    super::without_joints(scene)?;
     let idle = means.idle.clone();
     let waiting = {
         let mut idle = lock(&idle);
@@ -216,7 +217,7 @@ fn scene_json(scene: &Scene) -> Value {
         json!({
             "type": match b.body_type {
                 RigidBodyType::Fixed => "fixed",
-                RigidBodyType::KinematicVelocityBased => "kinematic",
+                RigidBodyType::KinematicVelocityBased | RigidBodyType::KinematicPositionBased => "kinematic",
                 RigidBodyType::Dynamic => "dynamic",
             },
             "translation": b.translation.to_array(), "rotation": b.rotation.to_array(),

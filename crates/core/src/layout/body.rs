@@ -7,7 +7,7 @@ pub mod body_flags {
     pub const NONE: u32 = 0;
     /// Never moves.
     pub const FIXED: u32 = 1;
-    /// Moves with the velocity that the user sets, pushed by nothing.
+    /// Moves with the velocity that the user sets, or to the poses that the user gives it, pushed by nothing.
     pub const KINEMATIC: u32 = 2;
     /// Moved by forces and contacts.
     pub const DYNAMIC: u32 = 3;
@@ -19,6 +19,18 @@ pub mod body_flags {
     pub const ASLEEP: u32 = 8;
     /// Never to be put to sleep.
     pub const STAYS_AWAKE: u32 = 16;
+    /// Kinematic, and moved by poses: it has no velocity but that of the step in which it is given one.
+    pub const POSED: u32 = 32;
+}
+
+/// Bits of [`BodyProps::locked`]: the world's axes along and about which a body does not move.
+pub mod locks {
+    /// Bits of translations: x, y, z from the lowest.
+    pub const TRANSLATIONS: u32 = 7;
+    /// Bits of rotations: about x, y, z from the lowest.
+    pub const ROTATIONS: u32 = 56;
+    /// The lowest bit of those is so many bits up.
+    pub const FIRST_ROTATION: u32 = 3;
 }
 
 /// Bits of [`SolverBody::touched`].
@@ -27,6 +39,11 @@ pub mod touched {
     pub const CONTACT: u32 = 1;
     /// Joints that are solved directly: gravity comes in two half kicks.
     pub const JOINED: u32 = 2;
+    /// Either.
+    pub const ANY: u32 = 3;
+    /// Not what touches it: the [`locks`](super::locks) of translations stand so many bits up. Read as floats, each alone
+    /// is a number.
+    pub const FIRST_LOCK: u32 = 28;
 }
 
 /// What lasts of a body from step to step. 96 bytes. Position is that of the centre of mass; the body frame
@@ -83,10 +100,10 @@ pub struct BodyProps {
     pub angular_damping: f32,
     /// No point of a collider's surface is farther from the centre of mass, m.
     pub reach: f32,
-    /// Unused.
-    pub pad_b: u32,
-    /// Unused.
-    pub pad_c: u32,
+    /// [`locks`], of what can be pushed.
+    pub locked: u32,
+    /// Level of sub-steps that its island gets at least, of what can be pushed.
+    pub least_level: u32,
 }
 
 /// Where a body came to rest, and for how long it has stayed there. 48 bytes. Lasts from step to step, where bodies may
@@ -116,7 +133,7 @@ pub struct Rest {
 pub struct SolverBody {
     /// m/s.
     pub linear_velocity: [f32; 3],
-    /// 1/kg; zero when nothing may push the body.
+    /// 1/kg; zero when nothing may push the body. Pushes have no effect along locked axes ([`touched`]).
     pub inverse_mass: f32,
     /// rad/s, world frame.
     pub angular_velocity: [f32; 3],
@@ -128,7 +145,7 @@ pub struct SolverBody {
     pub eigenvalue: f32,
     /// Change of rotation since the step began, world frame: rotation = delta * start.
     pub delta: [f32; 4],
-    /// xx, yy, zz of the inverse inertia in the world frame at the start of the step, 1/(kg m²).
+    /// xx, yy, zz of the inverse inertia in the world frame at the start of the step, 1/(kg m²); zero where locked.
     pub inverse_inertia_diagonal: [f32; 3],
     /// Level of sub-steps that it is solved at, see [`StepParams::levels`](super::StepParams::levels).
     pub level: u32,

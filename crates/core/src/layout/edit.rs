@@ -26,10 +26,13 @@ pub mod edit_op {
     pub const FREEZE: u32 = 10;
     /// Nothing changes; like all edits it wakes the body.
     pub const WAKE: u32 = 11;
+    /// data\[0\] position, data\[1\] rotation of the body's own frame at the end of the step: it gets the velocities that
+    /// lead there.
+    pub const NEXT_POSE: u32 = 12;
     /// A collider is written: data\[0..6\] its 96 bytes, `born` excepted, which is the step's number.
-    pub const COLLIDER: u32 = 12;
+    pub const COLLIDER: u32 = 13;
     /// The collider is gone: all zero but for the body that it was on.
-    pub const COLLIDER_REMOVE: u32 = 13;
+    pub const COLLIDER_REMOVE: u32 = 14;
 }
 
 /// One edit. 128 bytes.

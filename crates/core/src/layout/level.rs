@@ -31,6 +31,11 @@ impl StepParams {
         }
     }
 
+    /// Whether islands may be at different levels.
+    pub fn is_leveled(&self) -> bool {
+        self.tolerance >= 0.0 || self.levels != 1
+    }
+
     /// Length of this level's sub-steps, s.
     pub fn h_of(&self, level: u32) -> f32 {
         self.h * (1.0 / (1 << level) as f32)

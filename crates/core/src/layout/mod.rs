@@ -15,7 +15,7 @@ mod query;
 mod step;
 mod tree;
 
-pub use body::{BodyProps, BodyState, PoseRecord, Rest, SolverBody, body_flags, pose_tag, touched};
+pub use body::{BodyProps, BodyState, PoseRecord, Rest, SolverBody, body_flags, locks, pose_tag, touched};
 pub use collider::{Aabb, Collider, aabb_body, shape_kind};
 pub use constraint::{ConstraintHead, ConstraintPoint, Impulse, ManifoldMemory, tangents};
 pub use control::{BATCHES, BREAK_NAMES, Control, LAST_BATCH, QUARANTINE_NAMES, UNBATCHED, overflow};

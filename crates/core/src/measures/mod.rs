@@ -1,12 +1,14 @@
 //! What a run is judged by, computed on the host in f64 from the scene and the poses and velocities that came
-//! back: overlap, energy, momentum, and a hash of the exact state.
+//! back: overlap, separation of joints, energy, momentum, and a hash of the exact state.
 
 mod energy;
 mod hash;
+mod joints;
 mod overlap;
 
 pub use energy::{angular_momentum, kinetic_energy, linear_momentum, potential_energy};
 pub use hash::state_hash;
+pub use joints::{JointError, joint_coordinates, joint_error};
 pub use overlap::{
     DPose, ball_ball_separation, ball_cuboid_separation, ball_halfspace_separation, cuboid_cuboid_separation,
     cuboid_halfspace_separation, penetration,

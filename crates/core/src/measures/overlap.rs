@@ -9,6 +9,7 @@ use crate::report::Penetration;
 use crate::scene::Scene;
 use crate::shape::Shape;
 use glam::{DQuat, DVec3};
+use std::collections::HashSet;
 
 /// A placement in f64: rotate, then translate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,11 +97,11 @@ fn reach(half: DVec3, axes: [DVec3; 3], direction: DVec3) -> f64 {
 }
 
 /// Depth of all overlapping pairs of colliders, m: the deepest and the mean. A pair counts when its colliders are
-/// on different bodies and at least one of the bodies is dynamic. Bodies without a pose are left out, and so are
+/// on different bodies, at least one of them dynamic, which no joint keeps from colliding. Bodies without a pose are left out, and so are
 /// pairs of half-spaces.
 pub fn penetration(scene: &Scene, poses: &Poses) -> Penetration {
     let (mut bounded, planes) = place(scene, poses);
-    let mut depths = Depths::default();
+    let mut depths = Depths { apart: apart(scene), ..Depths::default() };
     for plane in &planes {
         for other in &bounded {
             depths.add(plane, other);
@@ -127,8 +128,18 @@ pub fn penetration(scene: &Scene, poses: &Poses) -> Penetration {
     }
 }
 
+/// Slots of bodies that a joint keeps from colliding, lower first.
+fn apart(scene: &Scene) -> HashSet<[u32; 2]> {
+    let pair = |joint| {
+        let ([a, b], joint) = (scene.joined(joint).ok()?.map(|body| body.slot), scene.joint(joint).ok()?);
+        (!joint.contacts_enabled).then_some([a.min(b), a.max(b)])
+    };
+    scene.joints().filter_map(pair).collect()
+}
+
 #[derive(Default)]
 struct Depths {
+    apart: HashSet<[u32; 2]>,
     deepest: f64,
     total: f64,
     count: u64,
@@ -140,7 +151,7 @@ impl Depths {
             return;
         }
         let depth = -separation(&a.form, &b.form);
-        if depth > 0.0 {
+        if depth > 0.0 && !self.apart.contains(&[a.body.min(b.body), a.body.max(b.body)]) {
             self.deepest = self.deepest.max(depth);
             self.total += depth;
             self.count += 1;

@@ -116,7 +116,7 @@ fn heap(bodies: usize, seed: u64, grid: Grid, colliders: impl Fn(usize, &mut Ran
 }
 
 /// Four walls, 2 m thick, around a square of inner width `width`.
-fn add_walls(scene: &mut Scene, width: f32, height: f32) {
+pub(super) fn add_walls(scene: &mut Scene, width: f32, height: f32) {
     const THICK: f32 = 1.0;
     let (reach, up) = (width * 0.5 + THICK, height * 0.5);
     for side in [-1.0, 1.0] {

@@ -6,18 +6,28 @@
 
 mod crowds;
 mod heaps;
+mod joints;
 mod materials;
+mod mechanisms;
 mod motion;
+mod ragdolls;
 mod random;
 mod stacks;
 mod structures;
 
 pub use crowds::{Crowd, crowd};
 pub use heaps::{balls, balls_seeded, mixed, mixed_seeded, pile, pile_seeded};
+pub use joints::{cable, chain, closed_chain, falling_chain, joint_grid, net, rope_bridge, wrecking_ball};
 pub use materials::{ball_column, ball_on_slope, conveyor, rolling_ball, spinning};
+pub use mechanisms::{
+    CAR_BODIES, CUBE_INERTIA, CUBE_MASS, Cardan, FOUR_BAR, FourBar, car, cardan, cars, four_bar, four_bars, heavy_top,
+    on_joint, pendulum, slider_on_slope,
+};
 pub use motion::{
     bouncing_ball, bullet, closed_system, cradle, free_box, free_fall, pulled_box, ramp, sliding_box, slip_to_roll,
+    t_handle, tumbling_box,
 };
+pub use ragdolls::{RAGDOLL_BODIES, ragdoll, ragdolls, ragdolls_seeded};
 pub use stacks::{
     column, hub, large_on_small, many_pyramids, mass_ratio, overlap_cube, pyramid, topped_pyramid, wide_pyramid,
 };
@@ -75,6 +85,60 @@ pub const ALL: &[StandardScene] = &[
         about: "one plate that carries all the others: more contacts on a body than there are batches",
         default_bodies: 501,
         build: |bodies| if bodies == 0 { floor_only() } else { hub(bodies - 1) },
+    },
+    StandardScene {
+        name: "chain",
+        about: "a chain let go level, its last link 100 times as heavy",
+        default_bodies: 20,
+        build: |bodies| chain(bodies, 100.0),
+    },
+    StandardScene {
+        name: "falling_chain",
+        about: "a chain of boxes that falls onto the floor",
+        default_bodies: 40,
+        build: falling_chain,
+    },
+    StandardScene {
+        name: "wrecking_ball",
+        about: "a chain of boxes with a ball 200 times as heavy as a link, that lands",
+        default_bodies: 16,
+        build: |bodies| if bodies == 0 { floor_only() } else { wrecking_ball(bodies - 1, 200.0) },
+    },
+    StandardScene {
+        name: "rope_bridge",
+        about: "planks tied to each other at both ends, hung between fixed ends",
+        default_bodies: 30,
+        build: rope_bridge,
+    },
+    StandardScene {
+        name: "net",
+        about: "a square net of balls, let go level and held by one corner",
+        default_bodies: 100,
+        build: |bodies| net(bodies.isqrt(), 1.0),
+    },
+    StandardScene {
+        name: "joint_grid",
+        about: "a large sheet of balls that hangs from every fourth ball of one edge",
+        default_bodies: 10_000,
+        build: |bodies| joint_grid(bodies.isqrt()),
+    },
+    StandardScene {
+        name: "ragdolls",
+        about: "figures of eleven boxes dropped into a pit",
+        default_bodies: 1100,
+        build: |bodies| ragdolls(bodies / RAGDOLL_BODIES),
+    },
+    StandardScene {
+        name: "four_bars",
+        about: "linkages of a crank that a motor turns, a coupler and a rocker",
+        default_bodies: 12,
+        build: |bodies| four_bars(bodies / 3),
+    },
+    StandardScene {
+        name: "cars",
+        about: "cars with springs and motors that drive over bumps",
+        default_bodies: 9,
+        build: |bodies| cars(bodies / CAR_BODIES),
     },
 ];
 

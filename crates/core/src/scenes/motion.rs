@@ -129,3 +129,28 @@ pub fn pulled_box() -> (Scene, BodyHandle, Vec<BodyHandle>) {
     let balls = balls.collect();
     (scene, pulled, balls)
 }
+
+/// A box of 0.2 x 0.5 x 0.9 m turning with 8 rad/s, all but 1 % of it about its middle axis, without gravity: it tumbles over
+/// and back; angular momentum and energy stay.
+pub fn tumbling_box() -> (Scene, BodyHandle) {
+    let mut scene = Scene::new();
+    scene.gravity = Vec3::ZERO;
+    let body = dynamic(Vec3::ZERO).angvel(Vec3::new(0.08, 8.0, 0.08));
+    let body = scene.insert(body, cuboid(Vec3::new(0.1, 0.25, 0.45))).body;
+    (scene, body)
+}
+
+/// A T of a bar, 2 x 0.1 x 0.2 m along x, and a handle on it, 0.6 m along z, turning with (0.01, 0.01, 10) rad/s, without
+/// gravity: z is its middle axis, so that it flips over and back; angular momentum and energy stay. The handle is a box with
+/// the inertia of a cylinder of radius 0.15 m.
+pub fn t_handle() -> (Scene, BodyHandle) {
+    let mut scene = Scene::new();
+    scene.gravity = Vec3::ZERO;
+    let body = dynamic(Vec3::ZERO).angvel(Vec3::new(0.01, 0.01, 10.0));
+    let body = scene.insert(body, cuboid(Vec3::new(1.0, 0.05, 0.1))).body;
+    let side = 0.5 * 3f32.sqrt() * 0.15;
+    let handle = cuboid(Vec3::new(side, side, 0.3)).translation(Vec3::Z * 0.4);
+    // A fresh handle and a collider of this file: nothing that `attach` would refuse.
+    drop(scene.attach(body, handle));
+    (scene, body)
+}

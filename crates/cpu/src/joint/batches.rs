@@ -6,7 +6,7 @@
 //! once more as rigid when bodies have moved. The inertia includes the geometric stiffness of all joints of a body.
 
 use super::drive::kind;
-use super::frame::frame;
+use super::frame::{frame, used};
 use super::island::{REGULARIZATION, Scene, Store};
 use super::rows::{Body, Work, inverse_inertia, own_arm, stiffening};
 use crate::math::vec3;
@@ -79,11 +79,11 @@ impl Loose {
         let joint = &scene.set.joints[slot as usize];
         let slots = [joint.body_a, joint.body_b];
         let own = Self { bodies: slots, ..Self::default() };
-        if level(&own, bodies).is_none() {
+        let [a, b] = slots.map(|slot| Body::of(&bodies.get(slot as usize), &scene.states[slot as usize]));
+        if a.inverse_mass == 0.0 && b.inverse_mass == 0.0 {
             return (own, state);
         }
         let mut work = Work::new(slot, joint, state, between(scene, slots), step.h);
-        let [a, b] = slots.map(|slot| Body::of(&bodies.get(slot as usize), &scene.states[slot as usize]));
         work.refresh(joint, &a, &b);
         work.carry_impulses();
         (Self::of(&mut work, scene, &a, &b, step), work.state)
@@ -95,22 +95,28 @@ impl Loose {
         if work.choose(joint, a, b, step.h) {
             work.rebuild(a, b);
         }
-        let mut used = 0;
-        let rows = std::array::from_fn(|which| {
+        let mut loose = Self {
+            bodies: [joint.body_a, joint.body_b],
+            arms: [work.frame.arm_a, work.frame.arm_b],
+            ..Self::default()
+        };
+        for which in 0..2 {
             let block = &work.blocks[which];
-            let axes = if which == 0 { work.frame.along } else { work.frame.about };
-            let of = |f: &dyn Fn(usize) -> f32| Vec3::new(f(0), f(1), f(2));
-            used |= u32::from(block.own != Vec3::ZERO) << which;
-            Rows {
-                axes,
-                mass: if block.own == Vec3::ZERO { Mat3::ZERO } else { block.diagonal(a, b, REGULARIZATION).inverse() },
-                kinds: block.pieces.map(|piece| piece.kind),
-                goal: of(&|row| block.pieces[row].goal),
-                gamma: of(&|row| block.pieces[row].gamma),
-                impulse: block.impulse,
+            if used(work.axes, which) == 0 || block.own == Vec3::ZERO {
+                continue;
             }
-        });
-        Self { bodies: [joint.body_a, joint.body_b], arms: [work.frame.arm_a, work.frame.arm_b], rows, used }
+            loose.used |= 1 << which;
+            let [x, y, z] = &block.pieces;
+            loose.rows[which] = Rows {
+                axes: if which == 0 { work.frame.along } else { work.frame.about },
+                mass: block.diagonal(a, b, REGULARIZATION).inverse(),
+                kinds: [x.kind, y.kind, z.kind],
+                goal: Vec3::new(x.goal, y.goal, z.goal),
+                gamma: Vec3::new(x.gamma, y.gamma, z.gamma),
+                impulse: block.impulse,
+            };
+        }
+        loose
     }
 
     /// Applies the impulses of the last sub-step.
@@ -134,7 +140,8 @@ impl Loose {
                 _ => b.angular - a.angular,
             };
             let own = rows.axes.transpose() * velocity;
-            let lack = Vec3::from_array(std::array::from_fn(|row| rows.lack(row, own[row], relax)));
+            let lack = |row: usize| rows.lack(row, own[row], relax);
+            let lack = Vec3::new(lack(0), lack(1), lack(2));
             let mut impulse = rows.mass * lack;
             for row in (0..3).filter(|&row| !relax && rows.kinds[row] == kind::LOCKED) {
                 impulse[row] = MASS_SHARE * impulse[row] - LEAK * rows.impulse[row];
@@ -170,6 +177,7 @@ impl Loose {
         self.visit(a, b, true);
         state.impulse = (work.frame.along * self.rows[0].impulse).to_array();
         state.torque = (work.frame.about * self.rows[1].impulse).to_array();
+        [state.separation, state.angle] = work.off_by(joint);
     }
 
     fn push(&mut self, which: usize, impulse: Vec3, a: &mut Body, b: &mut Body) {
@@ -184,29 +192,6 @@ impl Loose {
         b.linear += b.inverse_mass * push;
         b.angular += b.inverse_inertia * self.arms[1].cross(push);
     }
-
-    /// What lasts of the joint after a step.
-    pub fn lasting(
-        &self,
-        scene: &Scene<'_>,
-        slot: u32,
-        state: JointState,
-        bodies: &impl Store,
-        step: &StepParams,
-    ) -> JointState {
-        let joint = &scene.set.joints[slot as usize];
-        let mut work = Work::new(slot, joint, state, between(scene, self.bodies), step.h);
-        let [a, b] = self.bodies.map(|slot| Body::of(&bodies.get(slot as usize), &scene.states[slot as usize]));
-        work.refresh(joint, &a, &b);
-        work.choose(joint, &a, &b, step.h);
-        work.lasting(joint)
-    }
-}
-
-/// The level of sub-steps of a joint; none where both its bodies sleep or stand still.
-pub fn level(loose: &Loose, bodies: &impl Store) -> Option<u32> {
-    let ends = loose.bodies.map(|slot| bodies.get(slot as usize));
-    ends.into_iter().find(|body| body.inverse_mass > 0.0).map(|body| body.level)
 }
 
 /// From the first centre of mass to the second one when the step began, m.

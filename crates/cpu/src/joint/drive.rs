@@ -52,8 +52,11 @@ pub struct AxisState {
     pub response: f32,
 }
 
-/// The piece that holds for axis `axis` of the joint, over a sub-step of length `h`.
-pub fn piece(joint: &Joint, axis: usize, at: &AxisState, h: f32) -> Piece {
+/// The piece that holds for axis `axis` of the joint, over a sub-step of length `h`, where `was` held before. No choice leaps
+/// from one limit to the other: impulses are those of all rows together, and in a corner of several limits they may be
+/// so large that an axis seems to fly past all of its range. What is beyond a limit stands still there until the poses
+/// are projected.
+pub fn piece(joint: &Joint, axis: usize, at: &AxisState, h: f32, was: u32) -> Piece {
     let has = |bit: u32| joint.axes >> (bit + axis as u32) & 1 != 0;
     if at.response <= 0.0 {
         // Neither body can be moved this way.
@@ -74,12 +77,12 @@ pub fn piece(joint: &Joint, axis: usize, at: &AxisState, h: f32) -> Piece {
     let rubs = |velocity: f32| if velocity > 0.0 { -rub } else { rub };
     if has(joint_bits::LIMITED) {
         let JointDrive { low, high, .. } = *drive;
-        let (to_low, to_high) = ((low - at.coordinate) / h, (high - at.coordinate) / h);
+        let (to_low, to_high) = (((low - at.coordinate) / h).min(0.0), ((high - at.coordinate) / h).max(0.0));
         let hard = |kind, goal, limit: f32| Piece { kind, gamma: 0.0, goal, off: at.coordinate - limit };
-        if needed(to_low) > motor.impulse(to_low) + rubs(to_low) {
+        if was != kind::HIGH && needed(to_low) > motor.impulse(to_low) + rubs(to_low) {
             return hard(kind::LOW, to_low, low);
         }
-        if needed(to_high) < motor.impulse(to_high) - rubs(-to_high) {
+        if was != kind::LOW && needed(to_high) < motor.impulse(to_high) - rubs(-to_high) {
             return hard(kind::HIGH, to_high, high);
         }
     }

@@ -44,9 +44,15 @@ pub fn frame(joint: &Joint, a: &Pose, b: &Pose, between: Vec3) -> Frame {
     let (to_a, arm_b) =
         (rotate(a.rotation, Vec3::from(joint.anchor_a)), rotate(b.rotation, Vec3::from(joint.anchor_b)));
     let offset = between + (b.translation - a.translation) + (arm_b - to_a);
-    let (along, shift) = axes_along(joint, qa, offset);
-    let (about, turn) = axes_about(joint, qa, qb);
+    let (along, shift) =
+        if used(joint.axes, 0) != 0 { axes_along(joint, qa, offset) } else { (Mat3::ZERO, Vec3::ZERO) };
+    let (about, turn) = if used(joint.axes, 1) != 0 { axes_about(joint, qa, qb) } else { (Mat3::ZERO, Vec3::ZERO) };
     Frame { arm_a: to_a + offset, arm_b, along, about, shift, turn }
+}
+
+/// The rows along (0) or about (1) that something may act on, a bit a row; what has none is left out everywhere.
+pub fn used(axes: u32, which: usize) -> u32 {
+    (axes >> joint_bits::LOCKED | axes >> joint_bits::DRIVEN) >> (3 * which) & 7
 }
 
 /// Shorter distances of the anchors have no direction, m.

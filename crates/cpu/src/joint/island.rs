@@ -130,7 +130,7 @@ impl Island {
             if new.inverse_mass == 0.0 {
                 continue;
             }
-            new = body.put_velocities(new);
+            body.put_velocities(&mut new);
             if poses {
                 new.translation = body.pose.translation.to_array();
                 let start = quat(scene.states[slot as usize].rotation);

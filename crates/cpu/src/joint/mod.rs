@@ -119,12 +119,11 @@ impl Joints {
         &mut self,
         set: &JointSet,
         states: &[BodyState],
-        bodies: &mut [SolverBody],
+        bodies: &[SolverBody],
         step: &StepParams,
         control: &mut Control,
     ) {
         let first = set.topology.direct_joints() as usize;
-        let store = Shared::new(bodies);
         let all = &mut self.states;
         let mut keep = |slot: u32, new: JointState| {
             let joint = &set.joints[slot as usize];
@@ -136,10 +135,11 @@ impl Joints {
             }
         };
         for (place, (loose, state)) in self.loose.iter().zip(&self.loose_states).enumerate() {
-            if batches::level(loose, &store) == Some(step.level) {
+            let moving = loose.bodies.into_iter().find(|&slot| moves(states[slot as usize].flags));
+            if moving.is_some_and(|slot| bodies[slot as usize].level == step.level) {
                 let slot = set.topology.joints[first + place];
-                let scene = Scene { set, states, props: &[] };
-                keep(slot, loose.lasting(&scene, slot, *state, &store, step));
+                let broken = state.broken | u32::from(rows::breaks(&set.joints[slot as usize], state));
+                keep(slot, JointState { broken, ..*state });
             }
         }
         for (info, island) in set.topology.islands.iter().zip(&mut self.islands) {
@@ -210,7 +210,7 @@ impl Running<'_> {
                     if part == Part::BeginLoose {
                         let state_of = self.states[slot as usize];
                         (*loose, *state) = Loose::begin(&self.scene, slot, state_of, bodies, step);
-                    } else if batches::level(loose, bodies) == Some(step.level) {
+                    } else {
                         self.visit(part, slot, loose, state, bodies, step);
                     }
                 }
@@ -227,19 +227,30 @@ impl Running<'_> {
         bodies: &Shared<'_, SolverBody>,
         step: &StepParams,
     ) {
-        let slots = loose.bodies.map(|slot| slot as usize);
-        let before = slots.map(|slot| Store::get(bodies, slot));
-        let [mut a, mut b] = [0, 1].map(|end| Body::of(&before[end], &self.scene.states[slots[end]]));
+        let [ia, ib] = loose.bodies.map(|slot| slot as usize);
+        // What does not move is read by many.
+        let is_moved = |slot: usize| moves(self.scene.states[slot].flags);
+        // SAFETY: joints of a batch share no body that moves, and only those are written.
+        let [mut copy_a, mut copy_b] = [ia, ib].map(|slot| (!is_moved(slot)).then(|| Store::get(bodies, slot)));
+        let [a, b] = [(ia, &mut copy_a), (ib, &mut copy_b)].map(|(slot, copy)| match copy {
+            Some(copy) => copy,
+            // SAFETY: as above.
+            None => unsafe { &mut bodies.slice_mut(slot..slot + 1)[0] },
+        });
+        if (if is_moved(ia) { a.level } else { b.level }) != step.level || !(is_moved(ia) || is_moved(ib)) {
+            return;
+        }
+        let [mut seen_a, mut seen_b] = match part {
+            Part::RelaxLoose => [Body::of(a, &self.scene.states[ia]), Body::of(b, &self.scene.states[ib])],
+            _ => [Body::still(a), Body::still(b)],
+        };
         match part {
-            Part::WarmStartLoose => loose.warm_start(&mut a, &mut b),
-            Part::SolveLoose => loose.solve(&mut a, &mut b),
-            _ => loose.relax(&self.scene, state, slot, &mut a, &mut b, step),
+            Part::WarmStartLoose => loose.warm_start(&mut seen_a, &mut seen_b),
+            Part::SolveLoose => loose.solve(&mut seen_a, &mut seen_b),
+            _ => loose.relax(&self.scene, state, slot, &mut seen_a, &mut seen_b, step),
         }
-        for ((slot, before), body) in slots.into_iter().zip(before).zip([a, b]) {
-            if before.inverse_mass > 0.0 {
-                Store::set(bodies, slot, body.put_velocities(before));
-            }
-        }
+        seen_a.put_velocities(a);
+        seen_b.put_velocities(b);
     }
 
     fn stiffen(&self, index: usize, bodies: &Shared<'_, SolverBody>, step: &StepParams) {

@@ -5,7 +5,7 @@
 //! velocities is off by the remainder d, which is taken in where it is small or smooth.
 
 use super::drive::{AxisState, Piece, kind, piece};
-use super::frame::{Frame, Pose, frame};
+use super::frame::{Frame, Pose, frame, used};
 use crate::math::{quat, rotate, vec3};
 use bytemuck::Zeroable;
 use glam::{Mat3, Quat, Vec3};
@@ -54,14 +54,24 @@ impl Body {
         }
     }
 
+    /// The same without its pose.
+    pub fn still(body: &SolverBody) -> Self {
+        Self {
+            linear: vec3(body.linear_velocity),
+            angular: vec3(body.angular_velocity),
+            inverse_mass: body.inverse_mass,
+            inverse_inertia: inverse_inertia_of(body),
+            pose: Pose { translation: Vec3::ZERO, rotation: Quat::IDENTITY },
+        }
+    }
+
     /// The solver's body with these velocities; what joints add to them is no load of contacts.
-    pub fn put_velocities(&self, mut body: SolverBody) -> SolverBody {
+    pub fn put_velocities(&self, body: &mut SolverBody) {
         let (linear, angular) = (vec3(body.linear_velocity), vec3(body.angular_velocity));
         body.linear_start = (vec3(body.linear_start) + (self.linear - linear)).to_array();
         body.angular_start = (vec3(body.angular_start) + (self.angular - angular)).to_array();
         body.linear_velocity = self.linear.to_array();
         body.angular_velocity = self.angular.to_array();
-        body
     }
 
     /// The solver's body with this inertia. What contacts will add again to its angular velocity is what their torques do
@@ -209,8 +219,8 @@ impl Work {
     pub fn rebuild(&mut self, a: &Body, b: &Body) {
         let Frame { arm_a, arm_b, along, about, .. } = self.frame;
         let masses = a.inverse_mass + b.inverse_mass;
-        for (which, block) in self.blocks.iter_mut().enumerate() {
-            let rows = self.axes >> (3 * which) & 7 | self.axes >> (joint_bits::DRIVEN + 3 * which as u32) & 7;
+        for (which, block) in self.blocks.iter_mut().enumerate().filter(|(which, _)| used(self.axes, *which) != 0) {
+            let rows = used(self.axes, which);
             for row in 0..3 {
                 let axis = if rows >> row & 1 == 0 {
                     Vec3::ZERO
@@ -236,13 +246,17 @@ impl Work {
 
     /// Chooses the pieces of all rows for the velocities and impulses as they are. Whether the system is another one by it.
     pub fn choose(&mut self, joint: &Joint, a: &Body, b: &Body, h: f32) -> bool {
+        if joint.flags & joint_bits::SOFT == 0 && self.axes >> joint_bits::DRIVEN & 63 == 0 {
+            return self.choose_locked(h);
+        }
         let mut changed = false;
         for axis in 0..6 {
             if (self.axes | self.axes >> joint_bits::DRIVEN) >> axis & 1 == 0 {
                 continue;
             }
             let (which, row) = (axis / 3, axis % 3);
-            let mut new = piece(joint, axis, &self.at(which, row, a, b), h);
+            let was = self.blocks[which].pieces[row].kind;
+            let mut new = piece(joint, axis, &self.at(which, row, a, b), h, was);
             let piece = &mut self.blocks[which].pieces[row];
             if piece.kind == new.kind && (piece.gamma - new.gamma).abs() <= SAME_SPRING * piece.gamma {
                 // Its goal goes with either.
@@ -256,7 +270,7 @@ impl Work {
 
     /// Gives a body what the rows give now.
     pub fn push(&self, second: bool, body: &mut Body) {
-        for block in &self.blocks {
+        for (_, block) in self.blocks.iter().enumerate().filter(|(which, _)| used(self.axes, *which) != 0) {
             let along = block.along * block.push;
             if second {
                 body.linear += body.inverse_mass * along;
@@ -270,7 +284,7 @@ impl Work {
 
     /// What rows of a fixed impulse are still to give; others give nothing.
     pub fn fix(&mut self) {
-        for block in &mut self.blocks {
+        for (_, block) in self.blocks.iter_mut().enumerate().filter(|(which, _)| used(self.axes, *which) != 0) {
             for row in 0..3 {
                 let fixed = block.pieces[row].kind == kind::FIXED;
                 block.push[row] = if fixed { block.pieces[row].goal - block.impulse[row] } else { 0.0 };
@@ -281,6 +295,9 @@ impl Work {
 
     /// Gives a body what rows of a fixed impulse give now: they are in no block of the system.
     pub fn push_fixed(&self, second: bool, body: &mut Body) {
+        if self.blocks[0].push == Vec3::ZERO && self.blocks[1].push == Vec3::ZERO {
+            return;
+        }
         let push = self.frame.along * self.blocks[0].push;
         let arm = if second { self.frame.arm_b } else { self.frame.arm_a };
         let turn = body.inverse_inertia * (arm.cross(push) + self.frame.about * self.blocks[1].push);
@@ -291,6 +308,21 @@ impl Work {
             body.linear -= body.inverse_mass * push;
             body.angular -= turn;
         }
+    }
+
+    /// The same where all axes are locked hard, or free.
+    fn choose_locked(&mut self, h: f32) -> bool {
+        let mut changed = false;
+        for which in (0..2).filter(|&which| used(self.axes, which) != 0) {
+            let coordinates = if which == 0 { self.frame.shift } else { self.frame.turn };
+            let (rows, block) = (used(self.axes, which), &mut self.blocks[which]);
+            for row in (0..3).filter(|row| rows >> row & 1 != 0 && block.own[*row] > 0.0) {
+                let piece = &mut block.pieces[row];
+                changed |= piece.kind != kind::LOCKED;
+                *piece = Piece { kind: kind::LOCKED, gamma: 0.0, goal: -coordinates[row] / h, off: coordinates[row] };
+            }
+        }
+        changed
     }
 
     /// Where an axis is.
@@ -330,22 +362,26 @@ impl Work {
         let now = self.frame;
         let spin = h * a.angular.length().max(b.angular.length()) / THETA;
         let still = 1.0 / (1.0 + spin * spin * spin * spin);
-        let ways = [next.shift - now.shift, next.turn - now.turn];
-        let kept = [&mut self.state.remainder, &mut self.state.angular_remainder];
         let mut remainders = [Vec3::ZERO; 2];
-        for (((remainder, block), way), kept) in remainders.iter_mut().zip(&self.blocks).zip(ways).zip(kept) {
+        for which in (0..2).filter(|&which| used(self.axes, which) != 0) {
+            let way = if which == 0 { next.shift - now.shift } else { next.turn - now.turn };
+            let block = &self.blocks[which];
             let mut off = way / h - block.velocity(a, b);
             for row in 0..3 {
-                if block.pieces[row].kind != kind::LOCKED {
-                    off[row] = 0.0;
-                }
+                off[row] = match block.pieces[row].kind {
+                    kind::LOCKED => off[row],
+                    // It may have come into the system just now, and have no rows yet.
+                    kind::LOW | kind::HIGH => way[row] / h - self.at(which, row, a, b).velocity,
+                    _ => 0.0,
+                };
             }
+            let kept = if which == 0 { &mut self.state.remainder } else { &mut self.state.angular_remainder };
             let before = vec3(*kept);
             *kept = off.to_array();
             let change = (off - before).length() / ((off.length() + before.length()) * KAPPA + 1e-9);
             let smooth = 1.0 / (1.0 + change * change * change * change);
             let belief = LEAST + (1.0 - LEAST) * still.max(smooth);
-            *remainder = off * belief;
+            remainders[which] = off * belief;
         }
         remainders
     }
@@ -359,8 +395,9 @@ impl Work {
             let drive = &joint.drives[axis];
             off[row] = match self.blocks[which].pieces[row].kind {
                 // Of an axis that is locked by equal limits, those; else zero.
-                kind::LOCKED | kind::LOW => coordinate - drive.low,
-                kind::HIGH => coordinate - drive.high,
+                kind::LOCKED => coordinate - drive.low,
+                kind::LOW => (coordinate - drive.low).min(0.0),
+                kind::HIGH => (coordinate - drive.high).max(0.0),
                 _ => 0.0,
             };
         }
@@ -369,8 +406,17 @@ impl Work {
 
     /// What lasts of the joint after a step: it breaks where its last sub-step asked for too much.
     pub fn lasting(&self, joint: &Joint) -> JointState {
-        let (impulse, torque) = (vec3(self.state.impulse).length(), vec3(self.state.torque).length());
-        let breaks = impulse > joint.break_force * self.state.h || torque > joint.break_torque * self.state.h;
+        let [separation, angle] = self.off_by(joint);
+        JointState {
+            broken: self.state.broken | u32::from(breaks(joint, &self.state)),
+            separation,
+            angle,
+            ..self.state
+        }
+    }
+
+    /// How far locked axes are off, m and rad.
+    pub fn off_by(&self, joint: &Joint) -> [f32; 2] {
         let (mut separation, mut angle) = (Vec3::ZERO, Vec3::ZERO);
         for row in 0..3 {
             if self.blocks[0].pieces[row].kind == kind::LOCKED {
@@ -380,12 +426,7 @@ impl Work {
                 angle[row] = self.frame.turn[row] - joint.drives[3 + row].low;
             }
         }
-        JointState {
-            broken: self.state.broken | u32::from(breaks),
-            separation: separation.length(),
-            angle: angle.length(),
-            ..self.state
-        }
+        [separation.length(), angle.length()]
     }
 
     /// What it gives its bodies in this sub-step, in the world.
@@ -394,6 +435,12 @@ impl Work {
         self.state.impulse = (self.frame.along * along.impulse).to_array();
         self.state.torque = (self.frame.about * about.impulse).to_array();
     }
+}
+
+/// Whether the last sub-step asked for more than the joint bears.
+pub fn breaks(joint: &Joint, state: &JointState) -> bool {
+    let (impulse, torque) = (vec3(state.impulse).length(), vec3(state.torque).length());
+    impulse > joint.break_force * state.h || torque > joint.break_torque * state.h
 }
 
 /// Turn of a body in a sub-step up to which a prediction of the separation is believed, rad.

@@ -6,7 +6,7 @@
 
 use super::gauss_seidel::push_normal;
 use super::push::{arms, count, push_tangent};
-use crate::math::{inverse_inertia_times, vec3};
+use crate::math::{along_free, inverse_inertia_times, is_locked, vec3};
 use glam::Vec3;
 use tumble_core::layout::{BodyProps, BodyState, ConstraintHead, ConstraintPoint, Impulse, SolverBody, StepParams};
 
@@ -81,7 +81,9 @@ fn share(head: &ConstraintHead, point: &ConstraintPoint, [a, b]: [&SolverBody; 2
     let [ra, rb] = arms(head, point);
     let yields = |body: &SolverBody, r: Vec3| {
         let turn = r.cross(vec3(head.normal));
-        body.inverse_mass + turn.dot(inverse_inertia_times(body, turn))
+        let normal = vec3(head.normal);
+        let moved = if is_locked(body) { along_free(body, normal).dot(normal) } else { 1.0 };
+        body.inverse_mass * moved + turn.dot(inverse_inertia_times(body, turn))
     };
     (yields(a, ra) + yields(b, rb)) / (yields(parts[0], ra) + yields(parts[1], rb))
 }

@@ -55,7 +55,8 @@ fn share<L: Lanes>(head: &HeadLanes<L>, p: &PointLanes<L>, [a, b]: [&BodyLanes<L
 #[inline(always)]
 fn yields<L: Lanes>(body: &BodyLanes<L>, r: V3<L>, normal: V3<L>) -> L {
     let turn = r.cross(normal);
-    body.inverse_mass + turn.dot(body.inverse_inertia_times(turn))
+    let along = || body.inverse_mass * body.along_free(normal).dot(normal);
+    body.if_locked(body, body.inverse_mass, along) + turn.dot(body.inverse_inertia_times(turn))
 }
 
 /// How many parts each body is split into.

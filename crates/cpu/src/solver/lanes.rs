@@ -5,7 +5,7 @@ use super::resist::resists;
 use super::simd::{Lanes, V3};
 use super::store::Solved;
 use crate::shared::Shared;
-use tumble_core::layout::{ConstraintHead, Impulse, ManifoldPoint, SolverBody, StepParams};
+use tumble_core::layout::{ConstraintHead, Impulse, ManifoldPoint, SolverBody, StepParams, touched};
 use wide::f32x4;
 
 /// In place of a body where a group has fewer constraints.
@@ -174,8 +174,10 @@ pub(crate) struct Weights<L> {
 pub(crate) struct BodyLanes<L> {
     pub(crate) linear: V3<L>,
     pub(crate) inverse_mass: L,
+    /// Whether any of them has a locked axis.
+    locks: bool,
     pub(crate) angular: V3<L>,
-    /// The field beside the angular velocity, carried along.
+    /// The field beside the angular velocity, as it was loaded.
     touched: L,
     pub(crate) translation: V3<L>,
     pub(crate) eigenvalue: L,
@@ -201,6 +203,12 @@ fn columns<L: Lanes>(read: &impl Fn(usize) -> f32x4, index: L::Indices, r: usize
     L::columns(rows)
 }
 
+/// Bodies of which any of these translations (`locks`) is locked.
+#[inline(always)]
+fn locked<L: Lanes>(touched: L, locks: u32) -> L {
+    (touched & L::splat(f32::from_bits(locks << touched::FIRST_LOCK))).simd_gt(L::ZERO)
+}
+
 impl<L: Lanes> BodyLanes<L> {
     /// Loads bodies by `read`, which gives element i of the bodies seen as rows; without their change of pose when
     /// `moved` is false.
@@ -216,6 +224,7 @@ impl<L: Lanes> BodyLanes<L> {
         Self {
             linear: V3::new(vx, vy, vz),
             inverse_mass,
+            locks: locked::<L>(touched, 7).any(),
             angular: V3::new(wx, wy, wz),
             touched,
             translation: V3::new(tx, ty, tz),
@@ -279,7 +288,7 @@ impl<L: Lanes> BodyLanes<L> {
         r: V3<L>,
         push: V3<L>,
     ) {
-        let linear = self.inverse_mass * push;
+        let linear = self.inverse_mass * self.along_free(push);
         let angular = self.inverse_inertia_times(r.cross(push));
         for (lane, &body) in index.as_ref().iter().enumerate() {
             if self.inverse_mass.as_array()[lane] > 0.0 {
@@ -294,6 +303,25 @@ impl<L: Lanes> BodyLanes<L> {
                 }
             }
         }
+    }
+
+    /// What is left of a push where axes are locked.
+    #[inline(always)]
+    pub(crate) fn along_free(&self, push: V3<L>) -> V3<L> {
+        if !self.locks {
+            return push;
+        }
+        let along = |axis: u32, push: L| !locked(self.touched, 1 << axis) & push;
+        V3::new(along(0, push.x), along(1, push.y), along(2, push.z))
+    }
+
+    /// What `of_locked` gives for bodies with a locked axis, here or in `other`; `plain` for the others.
+    #[inline(always)]
+    pub(crate) fn if_locked(&self, other: &Self, plain: L, of_locked: impl FnOnce() -> L) -> L {
+        if !self.locks && !other.locks {
+            return plain;
+        }
+        (locked(self.touched, 7) | locked(other.touched, 7)).bitselect(of_locked(), plain)
     }
 
     #[inline(always)]

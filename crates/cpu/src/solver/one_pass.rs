@@ -16,7 +16,7 @@
 
 use super::push::{apply, arms, count, push_tangent, relative_velocity, separation, warm_start};
 use super::resist::resist;
-use crate::math::{finite, inverse_inertia_times, quat, rotate_back, vec3};
+use crate::math::{along_free, finite, inverse_inertia_times, quat, rotate_back, vec3};
 use glam::Vec3;
 use tumble_core::layout::{BodyProps, BodyState, ConstraintHead, ConstraintPoint, Impulse, SolverBody, StepParams};
 
@@ -160,9 +160,9 @@ fn eigenvalues(a: &SolverBody, b: &SolverBody) -> [f32; 2] {
 
 /// Counts `push` to what the sub-step began with.
 fn start_after([ra, rb]: [Vec3; 2], push: Vec3, a: &mut SolverBody, b: &mut SolverBody) {
-    a.linear_start = (vec3(a.linear_start) - a.inverse_mass * push).to_array();
+    a.linear_start = (vec3(a.linear_start) - a.inverse_mass * along_free(a, push)).to_array();
     a.angular_start = (vec3(a.angular_start) - inverse_inertia_times(a, ra.cross(push))).to_array();
-    b.linear_start = (vec3(b.linear_start) + b.inverse_mass * push).to_array();
+    b.linear_start = (vec3(b.linear_start) + b.inverse_mass * along_free(b, push)).to_array();
     b.angular_start = (vec3(b.angular_start) + inverse_inertia_times(b, rb.cross(push))).to_array();
 }
 

@@ -5,12 +5,14 @@ use super::resist::resists;
 use super::split;
 use crate::bounds::moves;
 use crate::contact::NO_FEATURE;
-use crate::math::{inverse_inertia_times, quat, rotate, tangents, vec3};
+use crate::math::{
+    along_free, free, held_inverse_inertia, inverse_inertia_times, is_locked, quat, rotate, tangents, unlocked, vec3,
+};
 use bytemuck::Zeroable;
 use glam::{Mat3, Vec3};
 use tumble_core::layout::{
     BodyProps, BodyState, Collider, ConstraintHead, ConstraintPoint, Impulse, Manifold, ManifoldMemory, Pair,
-    SolverBody, StepParams, pair_kind, shape_kind, solver,
+    SolverBody, StepParams, locks, pair_kind, shape_kind, solver, touched,
 };
 
 /// A body as the solver moves it; what nothing may push has no mass and keeps its velocity.
@@ -19,7 +21,7 @@ pub fn prepare_body(state: &BodyState, props: &BodyProps, mask: u64, step: &Step
         linear_velocity: state.linear_velocity,
         inverse_mass: 0.0,
         angular_velocity: state.angular_velocity,
-        touched: u32::from(mask != 0),
+        touched: if mask != 0 { touched::CONTACT } else { 0 },
         translation: [0.0; 3],
         eigenvalue: state.eigenvalue,
         delta: [0.0, 0.0, 0.0, 1.0],
@@ -44,8 +46,24 @@ pub fn prepare_body(state: &BodyState, props: &BodyProps, mask: u64, step: &Step
         };
         body.inverse_inertia_diagonal = [entry(0, 0), entry(1, 1), entry(2, 2)];
         body.inverse_inertia_off = [entry(0, 1), entry(0, 2), entry(1, 2)];
+        if props.locked != 0 {
+            lock(&mut body, state, props);
+        }
     }
     body
+}
+
+/// Neither velocity nor response along and about the locked axes.
+fn lock(body: &mut SolverBody, state: &BodyState, props: &BodyProps) {
+    body.touched |= (props.locked & locks::TRANSLATIONS) << touched::FIRST_LOCK;
+    let turns = free(props.locked, locks::FIRST_ROTATION);
+    body.linear_velocity = unlocked(vec3(body.linear_velocity), props.locked, 0).to_array();
+    body.angular_velocity = unlocked(vec3(body.angular_velocity), props.locked, locks::FIRST_ROTATION).to_array();
+    if props.locked & locks::ROTATIONS != 0 {
+        let [diagonal, off] = held_inverse_inertia(quat(state.rotation), vec3(props.inertia), turns);
+        body.inverse_inertia_diagonal = diagonal.to_array();
+        body.inverse_inertia_off = off.to_array();
+    }
 }
 
 /// What the rows of one constraint are made of.
@@ -243,7 +261,10 @@ fn combined(rule_a: u32, rule_b: u32, a: f32, b: f32) -> f32 {
 fn response(a: &SolverBody, b: &SolverBody, ra: Vec3, rb: Vec3, u: Vec3, v: Vec3) -> f32 {
     let turn_a = inverse_inertia_times(a, ra.cross(u)).cross(ra);
     let turn_b = inverse_inertia_times(b, rb.cross(u)).cross(rb);
-    (a.inverse_mass + b.inverse_mass) * u.dot(v) + v.dot(turn_a + turn_b)
+    let along = |body: &SolverBody| body.inverse_mass * along_free(body, u).dot(v);
+    let moved =
+        if is_locked(a) || is_locked(b) { along(a) + along(b) } else { (a.inverse_mass + b.inverse_mass) * u.dot(v) };
+    moved + v.dot(turn_a + turn_b)
 }
 
 fn point_velocity(body: &SolverBody, r: Vec3) -> Vec3 {

@@ -45,7 +45,9 @@ fn tangents<L: Lanes>(n: V3<L>) -> [V3<L>; 2] {
 fn response<L: Lanes>(a: &BodyLanes<L>, b: &BodyLanes<L>, ra: V3<L>, rb: V3<L>, u: V3<L>, v: V3<L>) -> L {
     let turn_a = a.inverse_inertia_times(ra.cross(u)).cross(ra);
     let turn_b = b.inverse_inertia_times(rb.cross(u)).cross(rb);
-    (a.inverse_mass + b.inverse_mass) * u.dot(v) + v.dot(turn_a + turn_b)
+    let along = |body: &BodyLanes<L>| body.inverse_mass * body.along_free(u).dot(v);
+    let moved = a.if_locked(b, (a.inverse_mass + b.inverse_mass) * u.dot(v), || along(a) + along(b));
+    moved + v.dot(turn_a + turn_b)
 }
 
 #[inline(always)]

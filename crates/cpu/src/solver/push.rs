@@ -2,7 +2,7 @@
 //! `shaders/solver/push.wgsl`.
 
 use super::resist;
-use crate::math::{finite, inverse_inertia_times, quat, rotate, vec3};
+use crate::math::{along_free, finite, inverse_inertia_times, quat, rotate, vec3};
 use glam::Vec3;
 use tumble_core::layout::{ConstraintHead, ConstraintPoint, Impulse, SolverBody, StepParams};
 
@@ -120,8 +120,8 @@ pub(super) fn relative_velocity(a: &SolverBody, b: &SolverBody, ra: Vec3, rb: Ve
 
 /// Applies `push` to b at `rb` and its opposite to a at `ra`.
 pub(super) fn apply(a: &mut SolverBody, b: &mut SolverBody, ra: Vec3, rb: Vec3, push: Vec3) {
-    a.linear_velocity = (vec3(a.linear_velocity) - a.inverse_mass * push).to_array();
+    a.linear_velocity = (vec3(a.linear_velocity) - a.inverse_mass * along_free(a, push)).to_array();
     a.angular_velocity = (vec3(a.angular_velocity) - inverse_inertia_times(a, ra.cross(push))).to_array();
-    b.linear_velocity = (vec3(b.linear_velocity) + b.inverse_mass * push).to_array();
+    b.linear_velocity = (vec3(b.linear_velocity) + b.inverse_mass * along_free(b, push)).to_array();
     b.angular_velocity = (vec3(b.angular_velocity) + inverse_inertia_times(b, rb.cross(push))).to_array();
 }

@@ -92,8 +92,8 @@ pub(super) fn bounce<L: Lanes>(
 
 #[inline(always)]
 pub(super) fn apply<L: Lanes>(a: &mut BodyLanes<L>, b: &mut BodyLanes<L>, ra: V3<L>, rb: V3<L>, push: V3<L>) {
-    a.linear = a.linear - a.inverse_mass * push;
+    a.linear = a.linear - a.inverse_mass * a.along_free(push);
     a.angular = a.angular - a.inverse_inertia_times(ra.cross(push));
-    b.linear = b.linear + b.inverse_mass * push;
+    b.linear = b.linear + b.inverse_mass * b.along_free(push);
     b.angular = b.angular + b.inverse_inertia_times(rb.cross(push));
 }

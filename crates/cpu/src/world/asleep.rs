@@ -297,7 +297,7 @@ impl Kept {
         joined: &[[u32; 2]],
         step: &StepParams,
     ) -> Vec<u32> {
-        match may_sleep(step).is_some() || step.tolerance >= 0.0 {
+        match may_sleep(step).is_some() || step.is_leveled() {
             true => island::label(states, manifolds, ends, joined),
             false => Vec::new(),
         }

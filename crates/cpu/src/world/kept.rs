@@ -197,11 +197,11 @@ impl Kept {
     fn edit(&mut self, edits: &EditBatch, step: &StepParams) -> Vec<BodyState> {
         self.props.resize(step.body_count as usize, BodyProps::zeroed());
         self.colliders.resize(step.collider_count as usize, Collider::zeroed());
-        let mut states = self.states.clone();
+        let mut states: Vec<BodyState> = self.states.iter().map(edit::begin).collect();
         states.resize(step.body_count as usize, BodyState::zeroed());
         let mut targets = edit::Targets { states: &mut states, props: &mut self.props, colliders: &mut self.colliders };
         for range in &edits.ranges {
-            edit::apply(*range, &edits.records, step.step, &mut targets);
+            edit::apply(*range, &edits.records, step, &mut targets);
         }
         states
     }
@@ -232,10 +232,10 @@ impl Kept {
         self.joints.reserve(&joints);
         let labels = self.labels(&states, &manifolds, &ends, &joints.topology.joined, step);
         control.islands = island::count(&labels);
-        if step.tolerance >= 0.0 {
+        if step.is_leveled() {
             let touching = level::Touching { manifolds: &manifolds, ends: &ends };
             let held = level::Held { joints: &joints, states: &self.joints.states };
-            level::decide(&mut states, &labels, &touching, &held, step, &mut control);
+            level::decide(&mut states, &self.props, &labels, &touching, &held, step, &mut control);
         }
         let mut bodies: Vec<SolverBody> = (0..states.len())
             .into_par_iter()
@@ -268,7 +268,7 @@ impl Kept {
             let running =
                 (!joints.topology.joints.is_empty()).then(|| self.joints.running(&joints, &states, &self.props));
             solver::solve(&mut self.rows, moving, running.as_ref(), &step, restitution);
-            self.joints.store(&joints, &states, &mut bodies, &step, &mut control);
+            self.joints.store(&joints, &states, &bodies, &step, &mut control);
             self.store(&own.order, &matched, &manifolds);
         }
         let run = watch.next(run, "motion");

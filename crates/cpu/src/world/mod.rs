@@ -166,7 +166,7 @@ impl World {
         step.cell_table_bits = limits::cell_table_bits(step.collider_count);
         step.large_limit = limits::large_limit(step.collider_count, self.editor.spread().is_wide());
         step.drop_pair = self.drop_pair;
-        step.levels = self.levels.of(&step);
+        step.levels = self.levels.of(&step, self.editor.plan().asked_levels);
         if self.kept.is_idle(&edits, &step) {
             self.kept.pass_time(&step);
             self.last_step.step = step.step;

@@ -347,7 +347,7 @@ impl World {
         step.pair_capacity = self.sizes.pairs;
         // The report of exactly three steps ago, so that no decision hangs on what has arrived. (It only decides which
         // dispatch a batch is in: the bits are the same.)
-        step.levels = self.levels.of(step);
+        step.levels = self.levels.of(step, record.wants.plan.asked_levels);
         let known = self.known.iter().find(|(number, ..)| number + limits::STATUS_DELAY == step.step);
         step.wide_batches = known.map_or(WIDE_BATCHES, |(_, count, _)| *count);
         // Nothing was awake then, and nothing has happened since that could wake anybody.
