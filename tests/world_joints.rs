@@ -137,8 +137,10 @@ fn at_rest_joints_bear_the_weight() {
 fn a_joint_breaks_once_and_lets_go() {
     let on_demand = Accuracy::Tolerance { penetration: 1e-3, joint: 1e-3, most: 32 };
     for (side, joints) in each() {
-        for accuracy in [Accuracy::default(), on_demand] {
-            let what = format!("{side:?}, {joints:?}, {accuracy}");
+        // New worlds have the most sub-steps, which are the shortest; by Gauss-Seidel no joint bears its weight so soon.
+        let soon = if joints == JointSolver::Direct { 4 } else { 70 };
+        for (accuracy, wait) in [(Accuracy::default(), 70), (on_demand, 70), (on_demand, soon)] {
+            let what = format!("{side:?}, {joints:?}, {accuracy}, {wait} steps");
             let mut scene = Scene::new();
             hang(&mut scene, Vec3::X * 5.0, Vec3::Y * -0.5, JointBuilder::spherical());
             let arm = Vec3::Y * -0.5;
@@ -150,7 +152,7 @@ fn a_joint_breaks_once_and_lets_go() {
                 (report.broken_joints, report.newly_broken)
             };
             for pull in [0.0, 0.9] {
-                for _ in 0..70 {
+                for _ in 0..wait {
                     world.edit().add_force(weight, Vec3::Y * -pull * MASS * G).unwrap();
                     world.step().unwrap();
                 }
