@@ -120,7 +120,7 @@ fn a_tolerance_has_a_minimum() {
         }
         scene
     };
-    let accuracy = Accuracy::Tolerance { penetration: 1e-3, most: 32 };
+    let accuracy = Accuracy::Tolerance { penetration: 1e-3, joint: 1e-3, most: 32 };
     for side in SIDES {
         for factor in [1, 2, 4, 8] {
             let mut world = side.world(&scene(factor), &Params { accuracy, ..Params::default() });
