@@ -15,7 +15,7 @@
 //#import shared/step.wgsl
 //#import shared/thread.wgsl
 
-const CONTROL_WORDS: u32 = 124u;
+const CONTROL_WORDS: u32 = 136u;
 const CLASSES: u32 = 1024u;
 const NO_CLAIM: u32 = 0xffffffffu;
 const LONGEST_RANGE: u32 = 50000u; // turns of one loop

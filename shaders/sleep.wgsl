@@ -331,6 +331,9 @@ fn pass_time(@builtin(local_invocation_index) lid: u32) {
     if lid < QUARANTINE_NAMES {
         atomicStore(&counters[CONTROL_QUARANTINED + lid], 0u);
     }
+    if lid < BREAK_NAMES {
+        atomicStore(&counters[CONTROL_NEWLY_BROKEN + lid], 0u);
+    }
     if lid == 0u {
         atomicStore(&counters[CONTROL_STEP], step.step);
         atomicStore(&counters[CONTROL_NEW_COUNT], 0u);

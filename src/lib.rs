@@ -35,9 +35,10 @@ pub use tumble_core as core;
 pub use tumble_core::{
     Accuracy, Batching, BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Contact,
     ContactPoint, Contacts, Editor, Error, GaussSeidel, Inserted, Jacobi, JointAxis, JointBuilder, JointHandle,
-    JointMotor, JointSoftness, JointSolver, LastBatch, MortonBits, MotorModel, Nearest, NearestQuery, OnePass, Overlap,
-    OverlapShape, Overlaps, Params, Penalty, Pose, Poses, Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene,
-    Shape, Sleep, Soft, Solver, Spent, StepReport, Traversal, Velocities, Velocity,
+    JointMotor, JointReading, JointSoftness, JointSolver, Joints, LastBatch, MortonBits, MotorModel, Nearest,
+    NearestQuery, OnePass, Overlap, OverlapShape, Overlaps, Params, Penalty, Pose, Poses, Ray, RayHit, Result,
+    RigidBodyBuilder, RigidBodyType, Scene, Shape, Sleep, Soft, Solver, Spent, StepReport, Traversal, Velocities,
+    Velocity,
 };
 pub use world::{Backend, World};
 
@@ -45,9 +46,10 @@ pub use world::{Backend, World};
 pub mod prelude {
     pub use crate::{
         Accuracy, Backend, Batching, BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule,
-        Contact, ContactPoint, Contacts, Error, JointAxis, JointBuilder, JointHandle, JointMotor, JointSolver,
-        MotorModel, Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Params, Pose, Poses, Ray, RayHit, Result,
-        RigidBodyBuilder, RigidBodyType, Scene, Shape, Sleep, StepReport, Velocities, Velocity, World,
+        Contact, ContactPoint, Contacts, Error, JointAxis, JointBuilder, JointHandle, JointMotor, JointReading,
+        JointSolver, Joints, MotorModel, Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Params, Pose, Poses,
+        Ray, RayHit, Result, RigidBodyBuilder, RigidBodyType, Scene, Shape, Sleep, StepReport, Velocities, Velocity,
+        World,
     };
     pub use glam::{Quat, Vec3};
 }

@@ -1,7 +1,7 @@
 //! One face for the CPU and the GPU world.
 
 use tumble_core::{
-    Contacts, Editor, Nearest, NearestQuery, OverlapShape, Overlaps, Params, Poses, Ray, RayHit, Result, Scene,
+    Contacts, Editor, Joints, Nearest, NearestQuery, OverlapShape, Overlaps, Params, Poses, Ray, RayHit, Result, Scene,
     StepReport, Velocities,
 };
 
@@ -143,6 +143,39 @@ impl World {
     /// [`Error::Capacity`](crate::Error::Capacity) when a step wants for room. What a device may refuse.
     pub fn contacts(&mut self) -> Result<Contacts> {
         either!(self, world => world.contacts())
+    }
+
+    /// Waits for all submitted steps; all joints after the last one, in one download: where they are, what they bear, and
+    /// which are broken. None before the first step. Edits are seen once a step has applied them.
+    ///
+    /// ```
+    /// use tumble::prelude::*;
+    ///
+    /// # fn main() -> Result<()> {
+    /// let mut scene = Scene::new();
+    /// let post = scene.insert(RigidBodyBuilder::fixed(), ColliderBuilder::ball(0.1)).body;
+    /// let below = RigidBodyBuilder::dynamic().translation(Vec3::new(0.0, -1.0, 0.0));
+    /// let ball = scene.insert(below, ColliderBuilder::ball(0.1).density(1000.0)).body;
+    /// let hinge = JointBuilder::revolute(Vec3::Z).local_anchor2(Vec3::Y);
+    /// let hinge = scene.insert_joint(post, ball, hinge)?;
+    /// let mut world = World::new(scene, Params::default(), Backend::Auto)?;
+    /// for _ in 0..30 {
+    ///     world.step()?;
+    /// }
+    /// let joints = world.joints()?;
+    /// let (force, angle) = (joints[hinge].force, joints[hinge].coordinate(JointAxis::AngX));
+    ///
+    /// let weight = 1000.0 * 4.0 / 3.0 * std::f32::consts::PI * 0.1f32.powi(3) * 9.81;
+    /// assert!((force - weight * Vec3::Y).length() < 1e-3 * weight);
+    /// assert!(angle.abs() < 1e-4 && joints[hinge].separation < 1e-4);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Capacity`](crate::Error::Capacity) when a step wants for room. What a device may refuse.
+    pub fn joints(&mut self) -> Result<Joints> {
+        either!(self, world => world.joints())
     }
 
     /// The first collider that each ray meets, or none; in the order of the rays. Where two are met at the same time, the

@@ -12,7 +12,7 @@ use std::process::{Command, Output};
 use tumble::core::{measures, scenes};
 use tumble::{Accuracy, Backend, Broadphase, Params, World};
 
-const FIELDS: [&str; 23] = [
+const FIELDS: [&str; 24] = [
     "scene",
     "backend",
     "adapter",
@@ -35,6 +35,7 @@ const FIELDS: [&str; 23] = [
     "growths",
     "lost",
     "quarantined",
+    "broken_joints",
     "state_hash",
 ];
 
@@ -63,17 +64,19 @@ fn keys(value: &Value) -> Vec<&str> {
 fn a_tolerance_is_kept_and_told() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("run.json");
-    let arguments = ["pyramid", "--bodies", "55", "--steps", "120", "--backend", "cpu", "--tolerance", "0.0005"];
+    let arguments = ["pyramid", "--bodies", "55", "--steps", "120", "--backend", "cpu", "--joint-tolerance", "0.0005"];
     let output = run(&[&arguments[..], &["--json", file.to_str().unwrap()]].concat());
     assert!(output.status.success(), "{}", text(&output.stderr));
     let json: Value = serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
-    let accuracy = Accuracy::Tolerance { penetration: 5e-4, most: 32 };
+    // Each of the two takes the other's value.
+    let accuracy = Accuracy::Tolerance { penetration: 5e-4, joint: 5e-4, most: 32 };
     let scene = scenes::pyramid(10);
     let mut world = World::new(scene, Params { accuracy, ..Params::default() }, Backend::Cpu).unwrap();
     (0..120).for_each(|_| world.step().unwrap());
     let spent = world.sync().unwrap().accuracy.unwrap();
     assert_eq!(json["spent"]["visits"], spent.visits);
     assert_eq!(json["spent"]["substeps"], spent.substeps);
+    assert_eq!(json["spent"]["joint_residual_m"], 0.0);
     assert!(text(&output.stdout).contains("sub-steps on the mean"), "{}", text(&output.stdout));
 }
 

@@ -104,7 +104,8 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             new_count, dead_count, constraint_count, point_count, batch_count, rounds, unplaced, last_count,
             large_count, max_degree, solved, turns, cell_class, cell_bits, center_min, inverse_cell, center_max,
             pad_a, batch_start, quarantined, pad_b, islands, islands_open, asleep, islands_asleep,
-            awake, manifolds_asleep, levels_wanted, levels_used, visits, residual, bodies_over, pad_c
+            awake, manifolds_asleep, levels_wanted, levels_used, visits, residual, bodies_over, broken_joints,
+            joint_residual, pad_c, pad_d, pad_e, newly_broken
         }
         Joint {
             rotation_a, rotation_b, anchor_a, body_a, anchor_b, body_b, axes, flags, generation, frequency,
@@ -140,7 +141,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             large_limit, edit_ranges, drop_pair, write_poses, batch_rounds, last_limit, wide_batches,
             static_bias_rate, static_mass_scale, static_impulse_scale, memory_gain, memory_limit,
             memory_band, blow_speed, solver, batching, sleep_distance, sleep_time, wake_all, iterations, slop,
-            levels, level, tolerance, pad_a
+            levels, level, tolerance, joint_scale, pad_a
         }
     })
 }
@@ -179,7 +180,7 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
         tree_members as "MEMBERS_" { MOVING, FIXED, LARGE, ALL }
         batching as "BATCHING_" { WRITE_AND_VERIFY, LOWEST_FREE, PERSISTENT, LAW, STATIC_LAST, SPLIT_LAST }
         ;
-        BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, NO_SLOT, NO_NODE, NO_COLLIDER,
+        BATCHES, LAST_BATCH, UNBATCHED, QUARANTINE_NAMES, BREAK_NAMES, NO_SLOT, NO_NODE, NO_COLLIDER,
         NO_BODY, LEVELS, LEVEL_HOLD, LEVEL_CALM, MOST_CREDIT
     }
 }

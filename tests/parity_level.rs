@@ -9,14 +9,31 @@ mod common;
 mod frame;
 
 use alone::Alone;
+use bytemuck::Zeroable;
 use frame::{Cpu, control_of, scene_of};
 use tumble_core::layout::*;
-use tumble_core::{Scene, scenes};
+use tumble_core::{JointSet, Scene, scenes};
 use tumble_cpu::{island, level};
 
 const PERMUTATIONS: [u32; 3] = [0, 1, 2];
 
-/// Bodies that want one thing and another, over contacts some of which overlap by too much.
+/// Joints between any bodies: some slots are empty, some joints broken, and some have taken no part in a step.
+fn joints(bodies: usize) -> (JointSet, Vec<JointState>) {
+    let count = if bodies < 2 { 0 } else { bodies + bodies / 3 };
+    let of = |i: usize| {
+        let (body_a, body_b) = ((i * 5 % bodies) as u32, ((i * 11 + 1) % bodies) as u32);
+        let flags = if i % 6 == 3 { 0 } else { joint_bits::ALIVE };
+        let joint = Joint { body_a, body_b, flags, generation: i as u32 % 4, ..Joint::zeroed() };
+        let tag = if i.is_multiple_of(9) { 0 } else { joint.generation + 1 };
+        let separation = [0.0, 3e-6, 2e-4, 4e-5, 1e-6][i * 17 % 5];
+        (joint, JointState { tag, broken: u32::from(i % 7 == 2), separation, ..JointState::zeroed() })
+    };
+    let (joints, states) = (0..count).map(of).unzip();
+    (JointSet { joints, ..JointSet::default() }, states)
+}
+
+/// Bodies that want one thing and another, over contacts some of which overlap by too much, and with joints
+/// some of which are too far apart.
 fn check(what: &str, scene: &Scene, levels: u32, tolerance: f32, alone: &mut Alone) {
     let cpu = Cpu::after(scene, 40);
     let frame = cpu.plan(false);
@@ -32,7 +49,9 @@ fn check(what: &str, scene: &Scene, levels: u32, tolerance: f32, alone: &mut Alo
         let apart = [1e-3, -1e-6, -2e-4, 5e-3, -3e-3][i * 13 % 5];
         manifold.points.iter_mut().for_each(|point| point.separation = apart);
     }
-    let step = StepParams { tolerance, levels, substeps: 4, ..frame.step };
+    // A tenth of a millimetre between joints, and a millimetre of overlap.
+    let step = StepParams { tolerance, joint_scale: 10.0, levels, substeps: 4, ..frame.step };
+    let (set, kept) = joints(states.len());
     let labels = island::label(&states, &manifolds, &frame.ends, &[]);
     let mut control = control_of(&frame, false);
 
@@ -44,20 +63,26 @@ fn check(what: &str, scene: &Scene, levels: u32, tolerance: f32, alone: &mut Alo
     alone.put("manifolds", &manifolds);
     alone.put("aabbs", &frame.aabbs);
     alone.put("islands", &labels);
+    alone.put("joints", &set.joints);
+    alone.put("joint_states", &kept);
     alone.put("island_credits", &vec![77u32; states.len()]);
     alone.put("island_leasts", &vec![77u32; states.len()]);
     alone.put("island_overlaps", &vec![77u32; states.len()]);
     let groups = |count: usize| (count as u32).div_ceil(256) + 1;
-    let (by_pair, by_body) = (groups(manifolds.len()), groups(states.len()));
+    let (by_pair, by_body, by_joint) = (groups(manifolds.len()), groups(states.len()), groups(kept.len()));
     alone.run(|chain| {
         chain.pass("level", "begin", by_body);
         chain.pass("level", "ask", by_body);
         chain.pass("level", "measure", by_pair);
+        chain.pass("level", "measure_joints", by_joint);
         chain.pass("level", "decide", by_body);
         chain.pass("level", "spend", by_pair);
+        chain.pass("level", "spend_joints", by_joint);
     });
 
-    level::decide(&mut states, &props, &labels, &manifolds, &frame.ends, &step, &mut control);
+    let touching = level::Touching { manifolds: &manifolds, ends: &frame.ends };
+    let held = level::Held { joints: &set, states: &kept };
+    level::decide(&mut states, &props, &labels, &touching, &held, &step, &mut control);
     let gpu: Vec<BodyState> = alone.take("work_states");
     assert!(gpu.iter().map(|s| s.credit).eq(states.iter().map(|s| s.credit)), "{what}: credits");
     assert!(gpu == states, "{what}: nothing but credits changes");

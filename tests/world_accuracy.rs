@@ -10,7 +10,7 @@ use tumble_core::{Accuracy, ColliderBuilder, Params, RigidBodyBuilder, Scene, Sp
 use worlds::{SIDES, Side, hash, report, steps};
 
 fn params(penetration: f32, most: u32) -> Params {
-    Params { accuracy: Accuracy::Tolerance { penetration, most }, ..Params::default() }
+    Params { accuracy: Accuracy::Tolerance { penetration, joint: 1e-4, most }, ..Params::default() }
 }
 
 /// Far from each other: a box under one of 1,000 times its mass, and boxes that lie on the ground by themselves.
@@ -122,8 +122,8 @@ fn both_sides_spend_alike() {
 #[test]
 fn tolerances_are_shown_as_told() {
     let shown = |penetration| params(penetration, 16).accuracy.to_string();
-    assert_eq!(shown(1e-4), "0.1 mm, 16 sub-steps at most");
-    assert_eq!(shown(1e-6), "0.001 mm, 16 sub-steps at most");
+    assert_eq!(shown(1e-4), "0.1 mm, joints 0.1 mm, 16 sub-steps at most");
+    assert_eq!(shown(1e-6), "0.001 mm, joints 0.1 mm, 16 sub-steps at most");
     assert_eq!([1, 8].map(|n| Accuracy::Substeps(n).to_string()), ["1 sub-step", "8 sub-steps"]);
 }
 

@@ -38,7 +38,7 @@ fn bad_params() -> Vec<(Params, &'static str)> {
     let soft = |law| Params { solver: Solver::Soft(law), ..good };
     let mut cases = vec![
         (Params { accuracy: Accuracy::Substeps(0), ..good }, "accuracy.substeps"),
-        (Params { accuracy: Accuracy::Tolerance { penetration: 1e-3, most: 7 }, ..good }, "accuracy.most"),
+        (Params { accuracy: Accuracy::Tolerance { penetration: 1e-3, joint: 1e-3, most: 7 }, ..good }, "accuracy.most"),
         (Params { threads: Some(0), ..good }, "threads"),
         (Params { capacities: Capacities { pairs: Some(0), ..room }, ..good }, "capacities.pairs"),
         (Params { capacities: Capacities { pairs: Some(1 << 26), ..room }, ..good }, "capacities.pairs"),

@@ -363,4 +363,4 @@ fn foot(pose: &Pose) -> Vec3 {
 }
 
 /// Sides that solve joints.
-const JOINT_SIDES: [Side; 1] = [Side::Cpu];
+const JOINT_SIDES: [Side; 2] = SIDES;

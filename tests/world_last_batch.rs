@@ -20,7 +20,7 @@ fn splitting() -> Params {
 #[test]
 fn a_hub_stays_together() {
     let scene = scenes::hub(500);
-    let tolerance = Accuracy::Tolerance { penetration: 1e-4, most: 32 };
+    let tolerance = Accuracy::Tolerance { penetration: 1e-4, joint: 1e-4, most: 32 };
     let all = [
         splitting(),
         Params { accuracy: tolerance, ..splitting() },

@@ -47,12 +47,16 @@ pub(crate) struct Asked {
     /// Length of a step in seconds [default: 1/60]
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     dt: Option<f32>,
-    /// Sub-steps a step; with --tolerance, the most that an island may take: a multiple of 8 [default: 8, or 32]
+    /// Sub-steps a step; with a tolerance, the most that an island may take: a multiple of 8 [default: 8, or 32]
     #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 256), allow_hyphen_values = true)]
     substeps: Option<u32>,
     /// Overlap that may be left, in metres: each island takes the sub-steps that it needs [default: all take the same]
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     tolerance: Option<f32>,
+    /// Separation of joints that may be left, in metres, as for --tolerance [default: the same as that; each of the two
+    /// takes the other's value where it is left out]
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    joint_tolerance: Option<f32>,
     /// Threads of the CPU side [default: one a core]
     #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1024), allow_hyphen_values = true)]
     threads: Option<u32>,
@@ -98,9 +102,12 @@ impl Asked {
     }
 
     fn accuracy(&self) -> Option<Accuracy> {
-        match self.tolerance {
-            Some(penetration) => Some(Accuracy::Tolerance { penetration, most: self.substeps.unwrap_or(32) }),
-            None => self.substeps.map(Accuracy::Substeps),
+        let tolerances = (self.tolerance.or(self.joint_tolerance), self.joint_tolerance.or(self.tolerance));
+        match tolerances {
+            (Some(penetration), Some(joint)) => {
+                Some(Accuracy::Tolerance { penetration, joint, most: self.substeps.unwrap_or(32) })
+            }
+            _ => self.substeps.map(Accuracy::Substeps),
         }
     }
 

@@ -15,6 +15,7 @@ pub(crate) struct Outcome {
     bodies: usize,
     /// Fixed and kinematic ones.
     others: usize,
+    joints: usize,
     pub(crate) steps: u32,
     params: Params,
     /// A step each.
@@ -37,6 +38,7 @@ impl Outcome {
             scene: name,
             bodies,
             others: scene.len() - bodies,
+            joints: scene.joint_count(),
             steps,
             params: *params,
             milliseconds: Vec::new(),
@@ -91,6 +93,7 @@ impl Outcome {
                 "substeps": spent.substeps,
                 "visits": spent.visits,
                 "residual_m": spent.residual_m,
+                "joint_residual_m": spent.joint_residual_m,
                 "bodies_over": spent.bodies_over,
             })),
             "ms_per_step": {
@@ -109,6 +112,7 @@ impl Outcome {
             "growths": growths,
             "lost": report.lost,
             "quarantined": report.quarantined,
+            "broken_joints": report.broken_joints,
             "state_hash": format!("{:016x}", self.state_hash),
         })
     }
@@ -125,9 +129,11 @@ impl Outcome {
         row("bodies", format!("{} dynamic, {} others", self.bodies, self.others));
         row("steps", format!("{} of {} s, {}", self.steps, params.dt, params.accuracy));
         if let Some(spent) = report.accuracy {
-            let each = f64::from(spent.visits) / f64::from(report.manifolds.max(1));
+            let visited = report.manifolds as usize + self.joints - report.broken_joints as usize;
+            let each = f64::from(spent.visits) / visited.max(1) as f64;
             row("spent", format!("{each:.1} sub-steps on the mean, {} at most", spent.substeps));
-            row("left", format!("{:.3} mm, {} bodies over", 1e3 * spent.residual_m, spent.bodies_over));
+            let (overlap, joints) = (1e3 * spent.residual_m, 1e3 * spent.joint_residual_m);
+            row("left", format!("{overlap:.3} mm, joints {joints:.3} mm, {} bodies over", spent.bodies_over));
         }
         row("ms a step", {
             format!("median {:.3}, p95 {:.3}", quantile(&self.milliseconds, 0.5), quantile(&self.milliseconds, 0.95))
@@ -154,6 +160,7 @@ impl Outcome {
         });
         row("lost", report.lost.to_string());
         row("quarantined", report.quarantined.to_string());
+        row("broken joints", report.broken_joints.to_string());
         row("state hash", format!("{:016x}", self.state_hash));
         table
     }

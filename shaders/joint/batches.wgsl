@@ -31,6 +31,11 @@ fn level_of_joint(place: u32) -> u32 {
 
 // The rows of a joint whose axes and impulses are those of now.
 fn make_rows(place: u32) {
+    // No piece is kept for being like the last one: each visit factors anew.
+    for (var which = 0u; which < 2u; which++) {
+        joint_works[place].rows[which].kinds = vec3<u32>();
+        joint_works[place].rows[which].gamma = vec3<f32>();
+    }
     if choose(place) {
         rebuild(place);
     }

@@ -3,7 +3,7 @@
 //   begin    once a step: joints as they are, the factor
 //   solve    before contacts: velocities that take the joints to where they belong
 //   relax    when bodies have moved: poses onto the joints, velocities that keep them there
-//   store    once a step: what lasts
+//   store    once a step: what lasts; names and counts the joints that are broken, in counters
 //
 // One workgroup an island, all islands at the level of sub-steps of the dispatch. Joints, bodies, blocks and entries of
 // the factor are shared out to its invocations; blocks of one level of the elimination do not touch each other. Reads and
@@ -19,6 +19,8 @@ const INVOCATIONS: u32 = 64u;
 const TURNS: u32 = 2u;
 
 @group(0) @binding(10) var<storage, read_write> joint_factors: array<vec4<f32>>;
+
+@group(0) @binding(12) var<storage, read_write> counters: array<atomic<u32>>;
 
 var<workgroup> shared_island: JointIsland;
 var<workgroup> shared_runs: u32;
@@ -383,11 +385,17 @@ fn relax(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
 @compute @workgroup_size(256)
 fn store(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec3<u32>, @builtin(local_invocation_index) lid: u32) {
     let place = invocation(wg, num, lid);
-    if place < joint_layout.joint_count && control.stop == 0u {
-        let slot = joint_tables[joint_layout.joints + place];
-        if moves(work_states[joints[slot].body_a].flags) || moves(work_states[joints[slot].body_b].flags) {
-            store_joint(place);
+    if place >= joint_layout.joint_count || atomicLoad(&counters[CONTROL_STOP]) != 0u {
+        return;
+    }
+    let slot = joint_tables[joint_layout.joints + place];
+    if moves(work_states[joints[slot].body_a].flags) || moves(work_states[joints[slot].body_b].flags) {
+        if store_joint(place) {
+            atomicMax(&counters[CONTROL_NEWLY_BROKEN + slot % BREAK_NAMES], slot + 1u);
         }
+    }
+    if joint_states[slot].tag == joints[slot].generation + 1u && joint_states[slot].broken != 0u {
+        atomicAdd(&counters[CONTROL_BROKEN_JOINTS], 1u);
     }
 }
 

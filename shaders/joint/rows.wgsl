@@ -139,6 +139,10 @@ fn begin_joint(place: u32) {
     joint_states[slot].impulse *= scale;
     joint_states[slot].torque *= scale;
     joint_states[slot].h = step.h;
+    if joint_states[slot].broken != 0u {
+        joint_states[slot].impulse = vec3<f32>();
+        joint_states[slot].torque = vec3<f32>();
+    }
     joint_works[place].slot = slot;
     joint_works[place].axes = select(joints[slot].axes, 0u, joint_states[slot].broken != 0u);
     joint_works[place].body_a = joints[slot].body_a;
@@ -508,17 +512,22 @@ fn stiffen(index: u32) {
 }
 
 // What lasts of a joint after a step: it breaks where its last sub-step asked for too much; what is not finite does not
-// last.
-fn store_joint(place: u32) {
+// last. Whether it breaks now.
+fn store_joint(place: u32) -> bool {
     let slot = joint_works[place].slot;
     let impulse = joint_states[slot].impulse;
     let torque = joint_states[slot].torque;
     if !is_finite3(impulse) || !is_finite3(torque) {
         joint_states[slot].tag = 0u;
-        return;
+        joint_states[slot].broken = 0u;
+        return false;
     }
-    let breaks = sqrt(dot(impulse, impulse)) * step.inverse_h > joints[slot].break_force
-        || sqrt(dot(torque, torque)) * step.inverse_h > joints[slot].break_torque;
+    // Where the last projection left it.
+    look(place);
+    // Each level has sub-steps of its own length.
+    let h = joint_states[slot].h;
+    let breaks = sqrt(dot(impulse, impulse)) > joints[slot].break_force * h
+        || sqrt(dot(torque, torque)) > joints[slot].break_torque * h;
     var separation: vec3<f32>;
     var angle: vec3<f32>;
     for (var row = 0u; row < 3u; row++) {
@@ -531,5 +540,7 @@ fn store_joint(place: u32) {
     }
     joint_states[slot].separation = sqrt(dot(separation, separation));
     joint_states[slot].angle = sqrt(dot(angle, angle));
+    let breaks_now = breaks && joint_states[slot].broken == 0u;
     joint_states[slot].broken |= u32(breaks);
+    return breaks_now;
 }

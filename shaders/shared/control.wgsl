@@ -9,6 +9,7 @@ const BATCHES: u32 = 64u;
 const LAST_BATCH: u32 = 63u;
 const UNBATCHED: u32 = 255u;
 const QUARANTINE_NAMES: u32 = 8u;
+const BREAK_NAMES: u32 = 8u;
 
 const OVERFLOW_NONE: u32 = 0u;
 const OVERFLOW_PAIRS: u32 = 1u;
@@ -57,6 +58,9 @@ const CONTROL_LEVELS_USED: u32 = 119u;
 const CONTROL_VISITS: u32 = 120u;
 const CONTROL_RESIDUAL: u32 = 121u;
 const CONTROL_BODIES_OVER: u32 = 122u;
+const CONTROL_BROKEN_JOINTS: u32 = 123u;
+const CONTROL_JOINT_RESIDUAL: u32 = 124u;
+const CONTROL_NEWLY_BROKEN: u32 = 128u;
 
 struct Control {
     stop: u32,
@@ -101,5 +105,10 @@ struct Control {
     visits: u32,
     residual: u32,
     bodies_over: u32,
+    broken_joints: u32,
+    joint_residual: u32,
     pad_c: u32,
+    pad_d: u32,
+    pad_e: u32,
+    newly_broken: array<vec4<u32>, 2>,
 }

@@ -55,5 +55,6 @@ struct StepParams {
     levels: u32,
     level: u32,
     tolerance: f32,
-    pad_a: vec2<u32>,
+    joint_scale: f32,
+    pad_a: u32,
 }

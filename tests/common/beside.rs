@@ -14,7 +14,7 @@ pub(crate) const SUBSTEPS: u32 = 8;
 /// The default, by its name.
 pub(crate) const USUAL: Accuracy = Accuracy::Substeps(SUBSTEPS);
 /// As many as each island needs for a tenth of a millimetre, 32 at most.
-pub(crate) const ON_DEMAND: Accuracy = Accuracy::Tolerance { penetration: 1e-4, most: 32 };
+pub(crate) const ON_DEMAND: Accuracy = Accuracy::Tolerance { penetration: 1e-4, joint: 1e-4, most: 32 };
 
 /// As a case of the table tells it.
 pub(crate) fn named(accuracy: Accuracy) -> String {

@@ -13,9 +13,10 @@ use std::fmt;
 pub enum Accuracy {
     /// This many sub-steps for everything, 1 to 256.
     Substeps(u32),
-    /// As many as it takes, for each island by itself (bodies that hang together by contacts). The overlap that a step
-    /// leaves is measured at the beginning of the next one: an island with more than the tolerance gets twice the
-    /// sub-steps, step after step up to the cap; one with less than an eighth of it half as many, after 16 such steps.
+    /// As many as it takes, for each island by itself (bodies that hang together by contacts and joints). The overlap
+    /// that a step leaves is measured at the beginning of the next one, and the separation of joints at its end: an island
+    /// with more than the tolerance of either gets twice the sub-steps, step after step up to the cap; one with less than
+    /// an eighth of both half as many, after 16 such steps.
     /// The bodies that a world begins with get all at first, so that structures are built with care. A number of sub-steps
     /// that no island took is first run three steps after one wants it, when a GPU has told. What was spent and what is
     /// left: [`StepReport::accuracy`](crate::StepReport::accuracy).
@@ -25,6 +26,8 @@ pub enum Accuracy {
     Tolerance {
         /// Deepest overlap that may be left, m; 1e-6 to 1.
         penetration: f32,
+        /// Widest separation that rigid locked axes of a joint may be left with, m; 1e-6 to 1. Angles are not measured.
+        joint: f32,
         /// Most sub-steps that any island gets; a multiple of 8, 8 to 256. Islands take all of them, a half, a quarter or
         /// an eighth.
         most: u32,
@@ -43,10 +46,10 @@ impl fmt::Display for Accuracy {
         match self {
             Self::Substeps(1) => write!(f, "1 sub-step"),
             Self::Substeps(n) => write!(f, "{n} sub-steps"),
-            Self::Tolerance { penetration, most } => {
+            Self::Tolerance { penetration, joint, most } => {
                 // To a thousandth of a millimetre, the least there may be: 0.1 is no f32.
-                let mm = (1e6 * f64::from(*penetration)).round() / 1e3;
-                write!(f, "{mm} mm, {most} sub-steps at most")
+                let mm = |tolerance: &f32| (1e6 * f64::from(*tolerance)).round() / 1e3;
+                write!(f, "{} mm, joints {} mm, {most} sub-steps at most", mm(penetration), mm(joint))
             }
         }
     }
@@ -57,8 +60,9 @@ impl Accuracy {
         let what = &what;
         match *self {
             Self::Substeps(n) => check((1..=256).contains(&n), what, "accuracy.substeps", n, "1 to 256"),
-            Self::Tolerance { penetration, most } => {
+            Self::Tolerance { penetration, joint, most } => {
                 check((1e-6..=1.0).contains(&penetration), what, "accuracy.penetration", penetration, "1e-6 to 1 m")?;
+                check((1e-6..=1.0).contains(&joint), what, "accuracy.joint", joint, "1e-6 to 1 m")?;
                 let even = most.is_multiple_of(1 << (LEVELS - 1));
                 check(even && (1..=256).contains(&most), what, "accuracy.most", most, "a multiple of 8, 8 to 256")
             }
@@ -88,6 +92,14 @@ impl Accuracy {
         }
     }
 
+    /// [`StepParams::joint_scale`].
+    pub(crate) fn joint_scale(&self) -> f32 {
+        match *self {
+            Self::Substeps(_) => 0.0,
+            Self::Tolerance { penetration, joint, .. } => penetration / joint,
+        }
+    }
+
     /// Whether it asks which bodies hang together.
     pub fn is_by_island(&self) -> bool {
         matches!(self, Self::Tolerance { .. })
@@ -99,11 +111,14 @@ impl Accuracy {
 pub struct Spent {
     /// Most sub-steps that an island took.
     pub substeps: u32,
-    /// Visits to contacts in the step: its constraints, each times the sub-steps of its island. Modulo 2^32.
+    /// Visits to contacts and joints in the step: its constraints and its joints that are not broken, each times the
+    /// sub-steps of its island. Modulo 2^32.
     pub visits: u32,
     /// Deepest overlap that the step before left, m, of those awake.
     pub residual_m: f32,
-    /// Bodies of islands that it left with more than the tolerance.
+    /// Widest separation of joints that the step before left, m, of those awake.
+    pub joint_residual_m: f32,
+    /// Bodies of islands that it left with more than either tolerance.
     pub bodies_over: u32,
 }
 

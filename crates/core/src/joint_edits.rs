@@ -3,7 +3,7 @@
 
 use crate::builder::RigidBodyType;
 use crate::handle::JointHandle;
-use crate::layout::{Joint, joint_bits};
+use crate::layout::{Control, Joint, joint_bits};
 use crate::packed::pack_joint;
 use crate::scene::Scene;
 use crate::topology::{JointSolver, Topology};
@@ -18,6 +18,23 @@ pub struct JointSet {
     pub joints: Vec<Joint>,
     /// How they are solved.
     pub topology: Arc<Topology>,
+}
+
+impl JointSet {
+    /// The handle of the joint at a slot, if one is there.
+    pub(crate) fn handle(&self, slot: u32) -> Option<JointHandle> {
+        let joint = self.joints.get(slot as usize).filter(|joint| joint.flags & joint_bits::ALIVE != 0)?;
+        Some(JointHandle { slot, generation: joint.generation })
+    }
+
+    /// The joints that a step names as newly broken.
+    #[doc(hidden)]
+    pub fn newly_broken(&self, control: &Control) -> Vec<JointHandle> {
+        let named = control.newly_broken.iter().filter_map(|name| name.checked_sub(1));
+        let mut joints: Vec<_> = named.filter_map(|slot| self.handle(slot)).collect();
+        joints.sort_unstable_by_key(|joint| joint.slot);
+        joints
+    }
 }
 
 /// What changed of the joints since the last step.

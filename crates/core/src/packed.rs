@@ -161,7 +161,9 @@ pub(crate) fn pack_joint(scene: &Scene, handle: JointHandle) -> Result<Joint> {
         }
         drive.friction = builder.friction[axis];
         if let Some([low, high]) = builder.limits[axis] {
-            (drive.low, drive.high) = (low, high);
+            // A distance is never below 0: a limit there would hold anchors that pass through each other.
+            let is_no_limit = builder.coupled && low <= 0.0 && low < high;
+            (drive.low, drive.high) = (if is_no_limit { NO_LIMIT } else { low }, high);
             set(joint_bits::LIMITED);
         }
         if let Some(motor) = builder.motors[axis] {
@@ -201,6 +203,9 @@ pub(crate) fn pack_joint(scene: &Scene, handle: JointHandle) -> Result<Joint> {
         drives,
     })
 }
+
+/// In place of no lowest coordinate, m: no speed reaches it, and what is computed from it stays finite.
+const NO_LIMIT: f32 = -1e12;
 
 /// In place of an infinite force, N: shaders may assume that floats are finite.
 const MOST_FORCE: f32 = 1e30;

@@ -331,6 +331,7 @@ impl Params {
             batching: self.batching_word(),
             levels: 1,
             tolerance: self.accuracy.tolerance(),
+            joint_scale: self.accuracy.joint_scale(),
             ..bytemuck::Zeroable::zeroed()
         }
     }

@@ -1,6 +1,7 @@
 //! What a step did.
 
 use crate::accuracy::Spent;
+use crate::handle::JointHandle;
 use crate::layout::{Control, QUARANTINE_NAMES, StepParams};
 use crate::params::Broadphase;
 use std::fmt;
@@ -86,6 +87,11 @@ pub struct StepReport {
     pub quarantined: u32,
     /// Slots of bodies newly quarantined in this step, the first few.
     pub newly_quarantined: Vec<u32>,
+    /// Joints that are broken, all told; [`Joints`](crate::Joints) tells which.
+    pub broken_joints: u32,
+    /// Joints that broke in this step, the first few. Each is named in one step alone: who must not miss any asks for the
+    /// report of each step, or for all joints in bulk.
+    pub newly_broken: Vec<JointHandle>,
     /// How often each buffer grew since the world was made.
     pub growths: Vec<(&'static str, u32)>,
     /// Bytes that the world holds.
@@ -127,6 +133,7 @@ impl StepReport {
             islands: control.islands,
             islands_asleep: control.islands_asleep,
             quarantined: control.frozen_count,
+            broken_joints: control.broken_joints,
             newly_quarantined: control.quarantined[..QUARANTINE_NAMES]
                 .iter()
                 .filter(|&&s| s != 0)
@@ -142,6 +149,7 @@ impl StepReport {
             substeps: control.levels_used.checked_ilog2().map_or(0, |level| step.substeps << level),
             visits: control.visits,
             residual_m: f32::from_bits(control.residual),
+            joint_residual_m: f32::from_bits(control.joint_residual),
             bodies_over: control.bodies_over,
         })
     }
@@ -179,13 +187,19 @@ impl fmt::Display for StepReport {
         if self.quarantined > 0 {
             write!(f, "; {} in quarantine (new: {:?})", self.quarantined, self.newly_quarantined)?;
         }
+        if self.broken_joints > 0 {
+            write!(f, "; {} joints broken (new:", self.broken_joints)?;
+            self.newly_broken.iter().try_for_each(|joint| write!(f, " {joint}"))?;
+            write!(f, ")")?;
+        }
         if self.islands_asleep > 0 {
             write!(f, "; asleep: {} bodies in {} islands", self.asleep, self.islands_asleep)?;
         }
-        if let Some(Spent { substeps, residual_m, bodies_over, .. }) = self.accuracy {
-            write!(f, "; up to {substeps} sub-steps, {:.3} mm left", 1e3 * residual_m)?;
+        if let Some(Spent { substeps, residual_m, joint_residual_m, bodies_over, .. }) = self.accuracy {
+            let (overlap, joints) = (1e3 * residual_m, 1e3 * joint_residual_m);
+            write!(f, "; up to {substeps} sub-steps, {overlap:.3} mm left, joints {joints:.3} mm")?;
             if bodies_over > 0 {
-                write!(f, " ({bodies_over} bodies over the tolerance)")?;
+                write!(f, " ({bodies_over} bodies over the tolerances)")?;
             }
         }
         for (buffer, n) in &self.growths {

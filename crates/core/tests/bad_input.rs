@@ -181,18 +181,21 @@ fn params() {
     let mut cases = vec![
         (within(Accuracy::Substeps(0)), "accuracy.substeps"),
         (within(Accuracy::Substeps(257)), "accuracy.substeps"),
-        (within(Accuracy::Tolerance { penetration: 0.0, most: 32 }), "accuracy.penetration"),
-        (within(Accuracy::Tolerance { penetration: 1.5, most: 32 }), "accuracy.penetration"),
-        (within(Accuracy::Tolerance { penetration: 1e-3, most: 0 }), "accuracy.most"),
-        (within(Accuracy::Tolerance { penetration: 1e-3, most: 12 }), "accuracy.most"),
-        (within(Accuracy::Tolerance { penetration: 1e-3, most: 264 }), "accuracy.most"),
+        (within(Accuracy::Tolerance { penetration: 0.0, joint: 1e-3, most: 32 }), "accuracy.penetration"),
+        (within(Accuracy::Tolerance { penetration: 1.5, joint: 1e-3, most: 32 }), "accuracy.penetration"),
+        (within(Accuracy::Tolerance { penetration: 1e-3, joint: 0.0, most: 32 }), "accuracy.joint"),
+        (within(Accuracy::Tolerance { penetration: 1e-3, joint: 1.5, most: 32 }), "accuracy.joint"),
+        (within(Accuracy::Tolerance { penetration: 1e-3, joint: 1e-3, most: 0 }), "accuracy.most"),
+        (within(Accuracy::Tolerance { penetration: 1e-3, joint: 1e-3, most: 12 }), "accuracy.most"),
+        (within(Accuracy::Tolerance { penetration: 1e-3, joint: 1e-3, most: 264 }), "accuracy.most"),
         (Params { threads: Some(0), ..good }, "threads"),
         (Params { capacities: capacities(0), ..good }, "capacities.pairs"),
     ];
     for bad in [NAN, INF, -INF, -1.0] {
         cases.extend([
             (Params { dt: bad, ..good }, "dt"),
-            (within(Accuracy::Tolerance { penetration: bad, most: 32 }), "accuracy.penetration"),
+            (within(Accuracy::Tolerance { penetration: bad, joint: 1e-3, most: 32 }), "accuracy.penetration"),
+            (within(Accuracy::Tolerance { penetration: 1e-3, joint: bad, most: 32 }), "accuracy.joint"),
             (by(Solver::Soft(Soft { frequency: bad, ..Soft::default() })), "solver.frequency"),
             (by(Solver::Soft(Soft { static_frequency: bad, ..Soft::default() })), "solver.static_frequency"),
             (by(Solver::Soft(Soft { damping_ratio: bad, ..Soft::default() })), "solver.damping_ratio"),

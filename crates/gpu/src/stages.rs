@@ -100,7 +100,7 @@ impl Stages {
             island.record(recorder, step, self.contact.a_pair(), joined)?;
         }
         if let Some(level) = self.level.as_ref().filter(|_| leveled) {
-            level.record(recorder, step, self.contact.a_pair())?;
+            level.record(recorder, step, self.contact.a_pair(), joints.joints.len() as u32)?;
         }
         self.batch.record(recorder, buffers, step, self.contact.a_pair())?;
 

@@ -57,7 +57,7 @@ impl Method {
     /// As the world is told, with so many sub-steps.
     pub fn accuracy(&self, substeps: u32) -> Accuracy {
         match self.tolerance {
-            Some(penetration) => Accuracy::Tolerance { penetration, most: substeps },
+            Some(tolerance) => Accuracy::Tolerance { penetration: tolerance, joint: tolerance, most: substeps },
             None => Accuracy::Substeps(substeps),
         }
     }

@@ -8,6 +8,8 @@ pub const LAST_BATCH: u32 = 63;
 pub const UNBATCHED: u32 = 255;
 /// How many quarantined bodies a step names; more are only counted.
 pub const QUARANTINE_NAMES: usize = 8;
+/// How many joints that broke a step names; more are only counted.
+pub const BREAK_NAMES: usize = 8;
 
 /// Values of [`Control::overflow`]: which buffer or bound was passed.
 pub mod overflow {
@@ -25,7 +27,7 @@ pub mod overflow {
     pub const SWEEP: u32 = 5;
 }
 
-/// Counters and decisions of a step, kept where the passes run. 496 bytes.
+/// Counters and decisions of a step, kept where the passes run. 544 bytes.
 ///
 /// Everything from `pair_count` on is written anew each step. `stop` is sticky: raised in the plan phase, cleared by
 /// the host when the buffer has grown.
@@ -118,12 +120,22 @@ pub struct Control {
     /// The same of the level that it got.
     pub levels_used: u32,
 
-    /// Constraints, each times its sub-steps, modulo 2^32.
+    /// Constraints and joints, each times its sub-steps, modulo 2^32.
     pub visits: u32,
     /// Deepest overlap, m, as float bits.
     pub residual: u32,
-    /// Bodies of islands with more overlap than the tolerance.
+    /// Bodies of islands with more overlap or separation than the tolerances.
     pub bodies_over: u32,
+    /// Joints that are broken, all told.
+    pub broken_joints: u32,
+    /// Widest separation of locked axes, m, as float bits.
+    pub joint_residual: u32,
     /// Unused.
     pub pad_c: u32,
+    /// Unused.
+    pub pad_d: u32,
+    /// Unused.
+    pub pad_e: u32,
+    /// Slots of joints that broke in this step, plus one; zero where there is none.
+    pub newly_broken: [u32; BREAK_NAMES],
 }

@@ -18,7 +18,7 @@ mod tree;
 pub use body::{BodyProps, BodyState, PoseRecord, Rest, SolverBody, body_flags, locks, pose_tag, touched};
 pub use collider::{Aabb, Collider, aabb_body, shape_kind};
 pub use constraint::{ConstraintHead, ConstraintPoint, Impulse, ManifoldMemory, tangents};
-pub use control::{BATCHES, Control, LAST_BATCH, QUARANTINE_NAMES, UNBATCHED, overflow};
+pub use control::{BATCHES, BREAK_NAMES, Control, LAST_BATCH, QUARANTINE_NAMES, UNBATCHED, overflow};
 pub use edit::{EditRange, EditRecord, edit_op};
 pub use joint::{
     Joint, JointBlock, JointBody, JointDrive, JointEntry, JointIsland, JointState, JointTables, NO_BODY, joint_bits,

@@ -98,8 +98,10 @@ pub struct StepParams {
     pub level: u32,
     /// Accuracy on demand: overlap that may be left, m; below 0 where none is measured.
     pub tolerance: f32,
+    /// What a metre of separation of a joint counts for, as overlap.
+    pub joint_scale: f32,
     /// Unused.
-    pub pad_a: [u32; 2],
+    pub pad_a: u32,
 }
 
 /// Words of [`StepParams::batching`]: a law, and flags.

@@ -198,8 +198,14 @@ impl Island {
     }
 
     /// What lasts of the joints after a step.
-    pub fn states(&self, set: &JointSet, step: &StepParams) -> impl Iterator<Item = JointState> {
-        self.works.iter().map(|work| work.lasting(&set.joints[work.slot as usize], step))
+    pub fn states(&mut self, set: &JointSet) -> impl Iterator<Item = JointState> {
+        let bodies = &self.bodies;
+        self.works.iter_mut().zip(&self.ends).map(|(work, &[a, b])| {
+            let joint = &set.joints[work.slot as usize];
+            // Where the last projection left it.
+            work.look(joint, &bodies[a], &bodies[b]);
+            work.lasting(joint)
+        })
     }
 
     fn rebuild(&mut self, scene: &Scene<'_>) {

@@ -21,7 +21,10 @@ use rows::Body;
 use std::ops::Range;
 use std::sync::Mutex;
 use tumble_core::JointSet;
-use tumble_core::layout::{BodyProps, BodyState, JointIsland, JointState, SolverBody, StepParams, touched};
+use tumble_core::layout::{
+    BREAK_NAMES, BodyProps, BodyState, Control, Joint, JointIsland, JointState, SolverBody, StepParams, joint_bits,
+    touched,
+};
 
 /// A part of a sub-step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,15 +114,32 @@ impl Joints {
         }
     }
 
-    /// Takes down what a level of sub-steps left of its joints.
-    pub(crate) fn store(&mut self, set: &JointSet, states: &[BodyState], bodies: &[SolverBody], step: &StepParams) {
+    /// Takes down what a level of sub-steps left of its joints, and names those that broke.
+    pub(crate) fn store(
+        &mut self,
+        set: &JointSet,
+        states: &[BodyState],
+        bodies: &[SolverBody],
+        step: &StepParams,
+        control: &mut Control,
+    ) {
         let first = set.topology.direct_joints() as usize;
+        let all = &mut self.states;
+        let mut keep = |slot: u32, new: JointState| {
+            let joint = &set.joints[slot as usize];
+            let state = &mut all[slot as usize];
+            let was_whole = !is_broken(joint, state);
+            *state = kept(new);
+            if was_whole && is_broken(joint, state) {
+                name(control, slot);
+            }
+        };
         for (place, (loose, state)) in self.loose.iter().zip(&self.loose_states).enumerate() {
             let moving = loose.bodies.into_iter().find(|&slot| moves(states[slot as usize].flags));
             if moving.is_some_and(|slot| bodies[slot as usize].level == step.level) {
-                let slot = set.topology.joints[first + place] as usize;
-                let broken = state.broken | u32::from(rows::breaks(&set.joints[slot], state, step));
-                self.states[slot] = kept(JointState { broken, ..*state });
+                let slot = set.topology.joints[first + place];
+                let broken = state.broken | u32::from(rows::breaks(&set.joints[slot as usize], state));
+                keep(slot, JointState { broken, ..*state });
             }
         }
         for (info, island) in set.topology.islands.iter().zip(&mut self.islands) {
@@ -128,11 +148,29 @@ impl Joints {
             }
             let island = island.get_mut().expect("no thread panicked with it");
             let slots = &set.topology.joints[info.first_joint as usize..][..info.joint_count as usize];
-            for (&slot, state) in slots.iter().zip(island.states(set, step)) {
-                self.states[slot as usize] = kept(state);
-            }
+            slots.iter().zip(island.states(set)).for_each(|(&slot, state)| keep(slot, state));
         }
     }
+
+    /// How many are broken.
+    pub(crate) fn broken(&self, set: &JointSet) -> u32 {
+        set.joints.iter().zip(&self.states).map(|(joint, state)| u32::from(is_broken(joint, state))).sum()
+    }
+}
+
+/// Whether what lasts is of this joint.
+pub fn is_of(joint: &Joint, state: &JointState) -> bool {
+    joint.flags & joint_bits::ALIVE != 0 && state.tag == joint.generation.wrapping_add(1)
+}
+
+fn is_broken(joint: &Joint, state: &JointState) -> bool {
+    is_of(joint, state) && state.broken != 0
+}
+
+/// Names a joint that broke; of those that share a place, the highest slot.
+fn name(control: &mut Control, slot: u32) {
+    let place = &mut control.newly_broken[slot as usize % BREAK_NAMES];
+    *place = (*place).max(slot + 1);
 }
 
 /// What is kept of a joint: nothing if it is not finite.
@@ -146,12 +184,13 @@ impl Running<'_> {
         let topology = &self.scene.set.topology;
         let first = topology.direct_joints() as usize;
         let batches = topology.batches.windows(2).map(|b| b[0] as usize - first..b[1] as usize - first);
-        match part {
-            Part::Begin | Part::Solve | Part::Relax => vec![0..topology.islands.len()],
-            Part::BeginLoose => vec![0..topology.joints.len() - first],
-            Part::Stiffen => vec![topology.direct_bodies() as usize..topology.bodies.len()],
-            Part::WarmStartLoose | Part::SolveLoose | Part::RelaxLoose => batches.collect(),
-        }
+        let one = match part {
+            Part::Begin | Part::Solve | Part::Relax => 0..topology.islands.len(),
+            Part::BeginLoose => 0..topology.joints.len() - first,
+            Part::Stiffen => topology.direct_bodies() as usize..topology.bodies.len(),
+            Part::WarmStartLoose | Part::SolveLoose | Part::RelaxLoose => return batches.collect(),
+        };
+        std::iter::once(one).collect()
     }
 
     /// Some of a stage's islands, bodies or joints. Those of a stage share nothing that is written.

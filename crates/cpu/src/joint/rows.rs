@@ -9,7 +9,7 @@ use super::frame::{Frame, Pose, frame, used};
 use crate::math::{quat, rotate, vec3};
 use bytemuck::Zeroable;
 use glam::{Mat3, Quat, Vec3};
-use tumble_core::layout::{BodyProps, BodyState, Joint, JointState, SolverBody, StepParams, joint_bits};
+use tumble_core::layout::{BodyProps, BodyState, Joint, JointState, SolverBody, joint_bits};
 
 /// A body as joints see it.
 #[derive(Debug, Clone, Copy)]
@@ -183,6 +183,9 @@ impl Work {
         state.impulse = state.impulse.map(|x| scale * x);
         state.torque = state.torque.map(|x| scale * x);
         state.h = h;
+        if state.broken != 0 {
+            (state.impulse, state.torque) = ([0.0; 3], [0.0; 3]);
+        }
         let axes = if state.broken != 0 { 0 } else { joint.axes };
         let still = Pose { translation: Vec3::ZERO, rotation: Quat::IDENTITY };
         let blocks = [Block::default(); 2];
@@ -406,10 +409,10 @@ impl Work {
     }
 
     /// What lasts of the joint after a step: it breaks where its last sub-step asked for too much.
-    pub fn lasting(&self, joint: &Joint, step: &StepParams) -> JointState {
+    pub fn lasting(&self, joint: &Joint) -> JointState {
         let [separation, angle] = self.off_by(joint);
         JointState {
-            broken: self.state.broken | u32::from(breaks(joint, &self.state, step)),
+            broken: self.state.broken | u32::from(breaks(joint, &self.state)),
             separation,
             angle,
             ..self.state
@@ -439,10 +442,9 @@ impl Work {
 }
 
 /// Whether the last sub-step asked for more than the joint bears.
-pub fn breaks(joint: &Joint, state: &JointState, step: &StepParams) -> bool {
-    let force = vec3(state.impulse).length() * step.inverse_h;
-    let torque = vec3(state.torque).length() * step.inverse_h;
-    force > joint.break_force || torque > joint.break_torque
+pub fn breaks(joint: &Joint, state: &JointState) -> bool {
+    let (impulse, torque) = (vec3(state.impulse).length(), vec3(state.torque).length());
+    impulse > joint.break_force * state.h || torque > joint.break_torque * state.h
 }
 
 /// Turn of a body in a sub-step up to which a prediction of the separation is believed, rad.

@@ -163,9 +163,10 @@ impl Kept {
 
     /// A step of a world that [is idle](Self::is_idle).
     pub(super) fn pass_time(&mut self, step: &StepParams) {
-        let Control { colored_as, free_count, old_pair_count, frozen_count, asleep, islands_asleep, .. } = self.control;
+        let Control { colored_as, free_count, old_pair_count, frozen_count, broken_joints, .. } = self.control;
+        let Control { asleep, islands_asleep, .. } = self.control;
         self.control = Control { step: step.step, colored_as, free_count, old_pair_count, ..Control::zeroed() };
-        self.control = Control { frozen_count, asleep, islands_asleep, ..self.control };
+        self.control = Control { frozen_count, broken_joints, asleep, islands_asleep, ..self.control };
         self.asleep.changed = false;
         self.asleep.sums.add_to(&mut self.control);
     }

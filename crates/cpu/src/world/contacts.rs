@@ -1,8 +1,8 @@
-//! Contacts in bulk: see `tumble_core::contacts`.
+//! Contacts and joints in bulk: see `tumble_core::contacts` and `tumble_core::joints`.
 
 use super::{World, asleep};
-use tumble_core::Result;
 use tumble_core::contacts::{Committed, Contacts};
+use tumble_core::{Joints, Result};
 
 impl World {
     /// All contacts of the last step, none before the first. Edits that no step has applied are not seen: a body that
@@ -25,5 +25,15 @@ impl World {
             memory: &kept.memory,
         };
         Ok(committed.contacts(&self.editor))
+    }
+
+    /// All joints after the last step, none before the first. Edits that no step has applied are not seen: a joint that was
+    /// removed since is there still.
+    ///
+    /// # Errors
+    /// None that a user can cause.
+    pub fn joints(&mut self) -> Result<Joints> {
+        let kept = &self.kept;
+        Ok(Joints::read(kept.control.step.into(), &kept.joint_set, &kept.states, &kept.joints.states))
     }
 }

@@ -41,6 +41,8 @@ pub(super) struct Kept {
     pub(super) rows: Rows,
     pub(super) asleep: Asleep,
     pub(super) joints: Joints,
+    /// Those of the last step.
+    pub(super) joint_set: Arc<JointSet>,
 }
 
 /// What the plan phase of a step finds; nothing of it lasts unless the step commits.
@@ -231,7 +233,9 @@ impl Kept {
         let labels = self.labels(&states, &manifolds, &ends, &joints.topology.joined, step);
         control.islands = island::count(&labels);
         if step.is_leveled() {
-            level::decide(&mut states, &self.props, &labels, &manifolds, &ends, step, &mut control);
+            let touching = level::Touching { manifolds: &manifolds, ends: &ends };
+            let held = level::Held { joints: &joints, states: &self.joints.states };
+            level::decide(&mut states, &self.props, &labels, &touching, &held, step, &mut control);
         }
         let mut bodies: Vec<SolverBody> = (0..states.len())
             .into_par_iter()
@@ -264,7 +268,7 @@ impl Kept {
             let running =
                 (!joints.topology.joints.is_empty()).then(|| self.joints.running(&joints, &states, &self.props));
             solver::solve(&mut self.rows, moving, running.as_ref(), &step, restitution);
-            self.joints.store(&joints, &states, &bodies, &step);
+            self.joints.store(&joints, &states, &bodies, &step, &mut control);
             self.store(&own.order, &matched, &manifolds);
         }
         let run = watch.next(run, "motion");
@@ -294,8 +298,10 @@ impl Kept {
             .iter()
             .map(|s| u32::from(s.flags & body_flags::FROZEN != 0 && s.flags & body_flags::KIND != 0))
             .sum();
+        control.broken_joints = self.joints.broken(&joints);
         control.old_pair_count = self.pairs.len() as u32;
         control.free_count = self.free.len() as u32;
+        self.joint_set = joints;
         self.control = control;
         watch.end(run);
     }

@@ -12,6 +12,7 @@ use asleep::Asleep;
 use bytemuck::Zeroable;
 use glam::Vec3;
 use kept::{Asked, Kept, Overflow};
+use std::sync::Arc;
 use tumble_core::edit::EditBatch;
 use tumble_core::layout::{Control, PoseRecord, StepParams};
 use tumble_core::limits::{self, Room};
@@ -78,6 +79,7 @@ impl World {
             rows,
             asleep: Asleep::default(),
             joints: crate::joint::Joints::default(),
+            joint_set: Arc::default(),
         };
         let (bodies, colliders) = (kept.states.len() as u32, kept.colliders.len() as u32);
         kept.reserve_pairs(limits::initial_pairs(&params.capacities, colliders))?;
@@ -261,6 +263,7 @@ impl World {
     fn finish(&mut self, attempt: usize, broadphase: Broadphase) {
         self.levels.push(&self.kept.control);
         let mut report = StepReport::from_control(&self.kept.control);
+        report.newly_broken = self.kept.joint_set.newly_broken(&self.kept.control);
         report.backend = "cpu";
         report.adapter = self.adapter.clone();
         report.bodies = self.editor.scene().len() as u32;

@@ -61,6 +61,8 @@ pub struct World {
     last: Control,
     /// What the last committed step was told.
     last_step: StepParams,
+    /// The joints that it had.
+    last_joints: Arc<JointSet>,
     /// Most pairs that a step had.
     most_pairs: u32,
     /// Of the last few steps: the number, how many batches were worth a dispatch, and how many bodies were awake where
@@ -157,6 +159,7 @@ impl World {
             submitted: 0,
             last: Control::zeroed(),
             last_step: StepParams::zeroed(),
+            last_joints: Arc::default(),
             most_pairs: 0,
             known: VecDeque::new(),
             levels: WantedLevels::default(),
@@ -310,6 +313,7 @@ impl World {
 
     fn report(&self) -> StepReport {
         let mut report = StepReport::from_control(&self.last);
+        report.newly_broken = self.last_joints.newly_broken(&self.last);
         report.backend = "gpu";
         report.adapter = format!("{}, {}", self.gpu.info.name, self.gpu.info.driver_info);
         report.bodies = self.editor.scene().len() as u32;
@@ -416,6 +420,7 @@ impl World {
                 let awake = if record.step.sleep_distance >= 0.0 { status.awake } else { u32::MAX };
                 self.known.push_back((record.step.step, wide_batches(&status, self.wide), awake));
                 self.last_step = record.step;
+                self.last_joints = record.edits.joints;
                 self.levels.push(&status);
                 self.most_pairs = self.most_pairs.max(status.old_pair_count);
                 if self.known.len() > 2 * IN_FLIGHT {

@@ -1,11 +1,11 @@
-//! What a world hands out in bulk: poses, velocities, contacts.
+//! What a world hands out in bulk: poses, velocities, contacts, joints.
 
 use super::{World, pose_bytes, read_control};
 use crate::readback::{read_now, read_parts};
 use bytemuck::pod_collect_to_vec;
 use tumble_core::contacts::{Committed, Contacts};
-use tumble_core::layout::{BodyState, Collider, FoundManifold, ManifoldMemory, Pair, PoseRecord};
-use tumble_core::{Error, Poses, Result, Velocities};
+use tumble_core::layout::{BodyState, Collider, FoundManifold, JointState, ManifoldMemory, Pair, PoseRecord};
+use tumble_core::{Error, Joints, Poses, Result, Velocities};
 
 impl World {
     /// Waits for all submitted steps; the pose of every body, in one download.
@@ -104,5 +104,24 @@ impl World {
             memory: &pod_collect_to_vec::<u8, ManifoldMemory>(memory),
         };
         Ok(committed.contacts(&self.editor))
+    }
+
+    /// Waits for all submitted steps; all joints after the last one, in one download, none before the first. Edits that no
+    /// step has applied are not seen: a joint that was removed since is there still.
+    ///
+    /// # Errors
+    /// As for [`World::step`].
+    pub fn joints(&mut self) -> Result<Joints> {
+        self.run_waiting()?;
+        self.take_statuses(0)?;
+        let bodies = u64::from(self.sizes.bodies) * size_of::<BodyState>() as u64;
+        let joints = self.last_joints.joints.len() as u64 * size_of::<JointState>() as u64;
+        let run = self.watch.begin("readback");
+        let parts = [(self.buffers.buffer("states")?, 0, bodies), (self.buffers.buffer("joint_states")?, 0, joints)];
+        let [bodies, states] = read_parts(&self.gpu, parts)?;
+        self.watch.end(run);
+        let bodies = pod_collect_to_vec::<u8, BodyState>(&bodies);
+        let states = pod_collect_to_vec::<u8, JointState>(&states);
+        Ok(Joints::read(self.last.step.into(), &self.last_joints, &bodies, &states))
     }
 }
