@@ -6,9 +6,11 @@ use tumble_bench::hard_cases::{Ask, By, Case};
 use tumble_core::{Accuracy, JointSolver, measures};
 
 /// Sides of tumble that joints are tested on.
-pub(crate) const SIDES: &[By] = &[By::Cpu, By::Gpu];
+pub(crate) const SIDES: &[By] = &By::OURS;
+/// Where a GPU in software would take too long.
+pub(crate) const CPU: &[By] = &[By::Cpu];
 /// The same, and rapier.
-pub(crate) const BESIDE: &[By] = &[By::Cpu, By::Gpu, By::Rapier];
+pub(crate) const BESIDE: &[By] = &By::ALL;
 /// Sub-steps of cases with joints: those that rapier takes of itself.
 pub(crate) const JOINT_SUBSTEPS: u32 = 4;
 

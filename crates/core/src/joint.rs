@@ -151,6 +151,10 @@ impl JointBuilder {
         let frame = |x: Vec3, y: Vec3| {
             let x = x.normalize_or_zero();
             let y = (y - x * x.dot(y)).normalize_or_zero();
+            if x == Vec3::ZERO || y == Vec3::ZERO {
+                // No axis, or parallel ones: `validate` refuses it.
+                return NO_ROTATION;
+            }
             Quat::from_mat3(&glam::Mat3::from_cols(x, y, x.cross(y)))
         };
         let mut joint = Self::generic(&[LinX, LinY, LinZ, AngZ]);
@@ -344,8 +348,10 @@ impl JointBuilder {
     }
 }
 
+const NO_ROTATION: Quat = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0);
+
 /// The rotation that takes x to `axis`; no rotation for what is none, which `validate` refuses.
 fn rotation_to(axis: Vec3) -> Quat {
     let unit = axis.normalize_or_zero();
-    if unit == Vec3::ZERO { Quat::from_xyzw(0.0, 0.0, 0.0, 0.0) } else { Quat::from_rotation_arc(Vec3::X, unit) }
+    if unit == Vec3::ZERO { NO_ROTATION } else { Quat::from_rotation_arc(Vec3::X, unit) }
 }

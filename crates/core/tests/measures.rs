@@ -374,3 +374,58 @@ fn hash_of_the_state() {
         assert_ne!(state_hash(&poses, &changed), hash, "body {i}");
     }
 }
+
+/// Oracle: the definition of the coordinates. Two cubes, the second one turned by 0.3 rad about z and shifted.
+#[test]
+fn joint_coordinates_and_error() {
+    use tumble_core::{JointAxis, JointBuilder};
+    let mut scene = Scene::new();
+    let cube = || ColliderBuilder::cuboid(0.5, 0.5, 0.5);
+    let a = scene.insert(RigidBodyBuilder::dynamic().rotation(Quat::from_rotation_z(0.2)), cube()).body;
+    let place = Quat::from_rotation_z(0.2) * Vec3::new(1.0, 0.01, -0.02);
+    let turned = RigidBodyBuilder::dynamic().translation(place).rotation(Quat::from_rotation_z(0.5));
+    let b = scene.insert(turned, cube()).body;
+    let joints = [
+        JointBuilder::revolute(Vec3::Z),
+        JointBuilder::fixed(),
+        JointBuilder::rope(0.9),
+        JointBuilder::prismatic(Vec3::X).limits(JointAxis::LinX, [-2.0, 2.0]),
+        JointBuilder::universal(Vec3::Z, Vec3::X),
+    ];
+    let joints = joints.map(|joint| scene.insert_joint(a, b, joint).unwrap());
+    let poses = initial_poses(&scene);
+    let at = joints.map(|joint| joint_coordinates(&scene, &poses, joint).unwrap());
+    let near = |found: f64, exact: f64| assert!((found - exact).abs() < 1e-6, "{found}, {exact}: {at:?}");
+    let distance = (1.0f64 + 1e-4 + 4e-4).sqrt();
+    // The hinge's axis x is z of the bodies.
+    near(at[0][3], 0.3);
+    near(at[0][0], -0.02);
+    near(at[1][5], 0.3);
+    [1.0, 0.01, -0.02].into_iter().enumerate().for_each(|(axis, exact)| near(at[1][axis], exact));
+    near(at[2][0], distance);
+    near(at[3][0], 1.0);
+    near(at[4][3], 0.3);
+    near(at[4][4], 0.0);
+    let error = joint_error(&scene, &poses);
+    near(error.max_m, distance);
+    near(error.max_rad, 0.3);
+    let means = [distance, distance, distance - 0.9, 0.01f64.hypot(0.02), distance];
+    near(error.mean_m, means.iter().sum::<f64>() / 5.0);
+    scene.remove_joint(joints[0]).unwrap();
+    assert!(joint_coordinates(&scene, &poses, joints[0]).is_none());
+}
+
+/// Oracle: two cubes that overlap by 0.4 m, which a joint keeps apart or does not.
+#[test]
+fn what_a_joint_keeps_apart_does_not_overlap() {
+    use tumble_core::JointBuilder;
+    for (contacts, deepest) in [(true, 0.4), (false, 0.0)] {
+        let mut scene = Scene::new();
+        let [a, b] = [0.0, 0.6].map(|x| {
+            let body = RigidBodyBuilder::dynamic().translation(Vec3::X * x);
+            scene.insert(body, ColliderBuilder::cuboid(0.5, 0.5, 0.5)).body
+        });
+        scene.insert_joint(b, a, JointBuilder::fixed().contacts_enabled(contacts)).unwrap();
+        assert!((penetration(&scene, &initial_poses(&scene)).max_m - deepest).abs() < 1e-6);
+    }
+}
