@@ -16,7 +16,7 @@ if [ -z "${HARD_CASES:-}" ]; then
 fi
 mkdir -p "$HARD_CASES"
 export HARD_CASES
-tests=(hard_cases materials structures versus_rapier extremes)
+tests=(hard_cases materials structures versus_rapier extremes joints_axes joints_beside joints_exact joints_random)
 failed=0
 cargo test --release --no-fail-fast "${tests[@]/#/--test=}" || failed=1
 cargo run --quiet --release -p tumble-bench --example hard_cases -- "$HARD_CASES" "$1"

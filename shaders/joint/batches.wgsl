@@ -8,7 +8,7 @@
 //
 // Reads and writes what `joint/rows` names.
 
-//#import joint/rows.wgsl
+//#import joint/inertia.wgsl
 
 // Share of the separation of locked rows that is taken out in a sub-step.
 const SHARE: f32 = 0.282;

@@ -10,7 +10,7 @@
 // writes what `joint/rows` names, and `joint_factors`: for each block its inverted diagonal (3) and its value (1), then
 // for each entry L and L D (3 and 3).
 
-//#import joint/rows.wgsl
+//#import joint/inertia.wgsl
 
 // How often pieces are chosen in a sub-step.
 const CHOICES: u32 = 3u;

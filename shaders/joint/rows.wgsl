@@ -24,8 +24,6 @@ const LEAST: f32 = 0.3;
 const JUMP: f32 = 0.2;
 // Springs that differ by no more than this share are one.
 const SAME_SPRING: f32 = 0.1;
-// Share of the geometric stiffness that joints add to the inertia.
-const STIFFENING: f32 = 2.0;
 // Largest turn of a body by a projection, rad.
 const MAX_PROJECTION: f32 = 0.5;
 // Share of its trace over three that is added to a block of a joint on a tree.
@@ -455,60 +453,6 @@ fn diagonal_block(place: u32, which: u32) -> mat3x3<f32> {
         k[row][row] += select(gamma[row] + more, 1.0, kinds[row] == PIECE_FIXED);
     }
     return k;
-}
-
-// Geometric stiffness of a joint at one of its bodies, as inertia over a sub-step.
-fn stiffening(arm: vec3<f32>, impulse: vec3<f32>, h: f32) -> mat3x3<f32> {
-    let pull = dot(arm, impulse);
-    let square = dot(arm, arm);
-    if pull <= 0.0 || square == 0.0 {
-        return mat3x3<f32>();
-    }
-    let share = STIFFENING * h * pull;
-    let outer = mat3x3<f32>(arm * arm.x, arm * arm.y, arm * arm.z) * (1.0 / square);
-    let one = mat3x3<f32>(vec3<f32>(1.0, 0.0, 0.0), vec3<f32>(0.0, 1.0, 0.0), vec3<f32>(0.0, 0.0, 1.0));
-    return (one - outer) * share;
-}
-
-// Table `bodies` of the topology.
-fn joint_body(index: u32) -> JointBody {
-    let at = joint_layout.bodies + 4u * index;
-    return JointBody(joint_tables[at], joint_tables[at + 1u], joint_tables[at + 2u], joint_tables[at + 3u]);
-}
-
-// The body's inertia with the geometric stiffness of its joints. What contacts will add again to its angular velocity is
-// what their torques do to the new inertia.
-fn stiffen(index: u32) {
-    let info = joint_body(index);
-    let slot = info.body;
-    if solver_bodies[slot].inverse_mass == 0.0 {
-        return;
-    }
-    let rotation = see(slot).rotation;
-    var more: mat3x3<f32>;
-    for (var k = 0u; k < info.end_count; k++) {
-        let end = joint_tables[joint_layout.ends + info.first_end + k];
-        let joint = joint_tables[joint_layout.joints + (end >> 1u)];
-        let second = (end & 1u) == 1u;
-        let arm = rotate(rotation, select(joints[joint].anchor_a, joints[joint].anchor_b, second));
-        let impulse = select(-joint_states[joint].impulse, joint_states[joint].impulse, second);
-        more += stiffening(arm, impulse, step.h);
-    }
-    let r = mat3_from_quat(rotation);
-    let i = props[slot].inverse_inertia;
-    var inertia = mat3x3<f32>(r[0] * i.x, r[1] * i.y, r[2] * i.z) * transpose(r);
-    let stiff = any(more[0] != vec3<f32>()) || any(more[1] != vec3<f32>()) || any(more[2] != vec3<f32>());
-    if stiff && any(i != vec3<f32>()) {
-        let p = props[slot].inertia;
-        inertia = inverse3(mat3x3<f32>(r[0] * p.x, r[1] * p.y, r[2] * p.z) * transpose(r) + more);
-    }
-    let before = inverse_inertia_of(slot);
-    let carried = solver_bodies[slot].angular_velocity - solver_bodies[slot].angular_start;
-    if determinant(before) > 0.0 && any(carried != vec3<f32>()) {
-        solver_bodies[slot].angular_start = solver_bodies[slot].angular_velocity - inertia * (inverse3(before) * carried);
-    }
-    solver_bodies[slot].inverse_inertia_diagonal = vec3<f32>(inertia[0].x, inertia[1].y, inertia[2].z);
-    solver_bodies[slot].inverse_inertia_off = vec3<f32>(inertia[0].y, inertia[0].z, inertia[1].z);
 }
 
 // What lasts of a joint after a step: it breaks where its last sub-step asked for too much; what is not finite does not

@@ -131,7 +131,7 @@ struct Row {
 }
 
 const SECTIONS: [(char, &str); 4] =
-    [('A', "Analytic"), ('B', "Stacks, structures and heaps"), ('C', "Ratios of mass"), ('D', "Extremes")];
+    [('A', "Analytic"), ('B', "Stacks, structures and heaps"), ('C', "Ratios of mass, and joints"), ('D', "Extremes")];
 
 const LEAD: &str = "dt 1/60 s, friction 0.6 and sleep off unless a row says otherwise; sub-steps are tumble's / rapier's, 8 and 4 \
     being what each takes of itself. Ratio: tumble's number over rapier's, of the side that does worse. Verdicts: an error \
