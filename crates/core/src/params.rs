@@ -154,8 +154,8 @@ impl Default for Capacities {
 /// When bodies are put to sleep. A sleeping body keeps its pose, its contacts and what they push, and costs next to
 /// nothing.
 ///
-/// An island, the bodies that hang together by contacts, sleeps as a whole once no point of any body's surface has been
-/// farther than `distance` from where it was, for `time`. Poses decide and not velocities, since piles keep bodies that
+/// An island, the bodies that hang together by contacts and joints, sleeps as a whole once no point of any body's surface
+/// has been farther than `distance` from where it was, for `time`. Poses decide and not velocities, since piles keep bodies that
 /// rattle in their places for ever; so what creeps along more slowly than `distance / time` is taken to rest. Nothing
 /// sleeps that a moving kinematic body touches.
 ///

@@ -89,7 +89,7 @@ impl Plan {
         Self { sleep: self.sleep || params.sleep.is_some(), levels, split, ..self }
     }
 
-    /// Whether something asks which bodies hang together by contacts.
+    /// Whether something asks which bodies hang together by contacts and joints.
     pub fn islands(&self) -> bool {
         self.sleep || self.levels
     }

@@ -157,7 +157,7 @@ fn plan_names_the_pairs_that_can_occur() {
     scene.insert(RigidBodyBuilder::fixed(), ColliderBuilder::halfspace(Vec3::Y));
     let mut plan = Plan::of(&scene);
     assert_eq!(plan.pair_kinds, 1 << pair_kind::BALL_HALFSPACE);
-    assert_eq!(plan.to_string(), "pairs: ball-halfspace; restitution: false; fixed: 0; islands: false");
+    assert_eq!(plan.to_string(), "pairs: ball-halfspace; restitution: false; fixed: 0; joints: false; islands: false");
 
     let mut boxes = Scene::new();
     boxes.insert(RigidBodyBuilder::dynamic(), ColliderBuilder::cuboid(1.0, 1.0, 1.0).restitution(0.1));
