@@ -35,8 +35,8 @@ pub use tumble_core as core;
 pub use tumble_core::{
     Accuracy, Batching, BodyHandle, Broadphase, Capacities, ColliderBuilder, ColliderHandle, CombineRule, Contact,
     ContactPoint, Contacts, Editor, Error, GaussSeidel, Inserted, Jacobi, JointAxis, JointBuilder, JointHandle,
-    JointMotor, JointReading, JointSoftness, JointSolver, Joints, LastBatch, MortonBits, MotorModel, Nearest,
-    NearestQuery, OnePass, Overlap, OverlapShape, Overlaps, Params, Penalty, Pose, Poses, Ray, RayHit, Result,
+    JointMotor, JointReading, JointSoftness, JointSolver, Joints, JointsSolved, LastBatch, MortonBits, MotorModel,
+    Nearest, NearestQuery, OnePass, Overlap, OverlapShape, Overlaps, Params, Penalty, Pose, Poses, Ray, RayHit, Result,
     RigidBodyBuilder, RigidBodyType, Scene, Shape, Sleep, Soft, Solver, Spent, StepReport, Traversal, Velocities,
     Velocity,
 };

@@ -340,3 +340,29 @@ fn a_chain_gets_the_sub_steps_that_its_tolerance_asks_for() {
         assert!(coarse.steps_over == 0 && coarse.widest < 3e-2 && coarse.visits < 0.5, "{side:?}: {coarse:?}");
     }
 }
+
+/// Oracle: counting. A chain of 20 joints is solved directly, or as told; a sheet of more than 1,024 blocks falls back.
+#[test]
+fn the_report_tells_how_joints_were_solved() {
+    let (chain, sheet) = (tumble_core::scenes::chain(20, 1.0), tumble_core::scenes::joint_grid(24));
+    let all = sheet.joint_count() as u32;
+    assert!(all > 1024, "{all}");
+    for side in SIDES {
+        for (scene, joints, expected, text) in [
+            (&chain, JointSolver::Auto, (20, 1, 0, 0), "joints: 20 directly in 1 islands, 0 by Gauss-Seidel"),
+            (&chain, JointSolver::GaussSeidel, (0, 0, 20, 0), "joints: 0 directly in 0 islands, 20 by Gauss-Seidel"),
+            (&sheet, JointSolver::Direct, (0, 0, all, 1), "(1 islands too large)"),
+        ] {
+            let mut world = side.world(scene, &Params { joints, ..Params::default() });
+            steps(&mut world, 1);
+            let report = report(&mut world);
+            let told = report.joints;
+            assert_eq!(
+                (told.direct, told.islands, told.gauss_seidel, told.too_large),
+                expected,
+                "{side:?}, {joints:?}"
+            );
+            assert!(report.to_string().contains(text), "{report}");
+        }
+    }
+}

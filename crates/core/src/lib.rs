@@ -53,7 +53,7 @@ pub use params::{Batching, Broadphase, Capacities, LastBatch, MortonBits, Params
 pub use plan::Plan;
 pub use poses::{Pose, Poses, Velocities, Velocity};
 pub use query::{Nearest, NearestQuery, Overlap, OverlapShape, Overlaps, Ray, RayHit};
-pub use report::{Penetration, StageRun, StageTime, StepReport};
+pub use report::{JointsSolved, Penetration, StageRun, StageTime, StepReport};
 pub use scene::Scene;
 pub use shape::Shape;
 pub use solver::{GaussSeidel, Jacobi, OnePass, Penalty, Soft, Solver};

@@ -218,7 +218,7 @@ pub struct Params {
     pub static_contacts_last: bool,
     /// How the last batch is solved.
     pub last_batch: LastBatch,
-    /// How joints are solved.
+    /// How joints are solved; [`StepReport::joints`](crate::StepReport::joints) tells how they were.
     pub joints: JointSolver,
     /// Room in buffers.
     pub capacities: Capacities,

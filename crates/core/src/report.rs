@@ -4,6 +4,7 @@ use crate::accuracy::Spent;
 use crate::handle::JointHandle;
 use crate::layout::{Control, QUARANTINE_NAMES, StepParams};
 use crate::params::Broadphase;
+use crate::topology::Topology;
 use std::fmt;
 
 /// Time of one stage in one step.
@@ -49,6 +50,28 @@ pub struct Penetration {
     pub mean_m: f64,
 }
 
+/// How joints were solved, see [`JointSolver`](crate::JointSolver).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct JointsSolved {
+    /// Joints that were solved directly.
+    pub direct: u32,
+    /// Islands of those.
+    pub islands: u32,
+    /// Joints that were solved by Gauss-Seidel.
+    pub gauss_seidel: u32,
+    /// Islands that fell back to it, being too large to be solved directly.
+    pub too_large: u32,
+}
+
+impl JointsSolved {
+    /// What the topology says.
+    #[doc(hidden)]
+    pub fn of(topology: &Topology) -> Self {
+        let (direct, islands) = (topology.direct_joints(), topology.islands.len() as u32);
+        Self { direct, islands, gauss_seidel: topology.joint_count() - direct, too_large: topology.too_large }
+    }
+}
+
 /// What one step found and did.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StepReport {
@@ -87,6 +110,8 @@ pub struct StepReport {
     pub quarantined: u32,
     /// Slots of bodies newly quarantined in this step, the first few.
     pub newly_quarantined: Vec<u32>,
+    /// How the step's joints were solved.
+    pub joints: JointsSolved,
     /// Joints that are broken, all told; [`Joints`](crate::Joints) tells which.
     pub broken_joints: u32,
     /// Joints that broke in this step, the first few. Each is named in one step alone: who must not miss any asks for the
@@ -186,6 +211,11 @@ impl fmt::Display for StepReport {
         }
         if self.quarantined > 0 {
             write!(f, "; {} in quarantine (new: {:?})", self.quarantined, self.newly_quarantined)?;
+        }
+        let JointsSolved { direct, islands, gauss_seidel, too_large } = self.joints;
+        if direct + gauss_seidel > 0 {
+            write!(f, "; joints: {direct} directly in {islands} islands, {gauss_seidel} by Gauss-Seidel")?;
+            write!(f, " ({too_large} islands too large)")?;
         }
         if self.broken_joints > 0 {
             write!(f, "; {} joints broken (new:", self.broken_joints)?;

@@ -18,7 +18,8 @@ use tumble_core::layout::{Control, PoseRecord, StepParams};
 use tumble_core::limits::{self, Room};
 use tumble_core::stopwatch::{Span, Stopwatch};
 use tumble_core::{
-    Broadphase, Editor, Error, Params, Poses, Result, Scene, StageTime, StepReport, Velocities, WantedLevels,
+    Broadphase, Editor, Error, JointsSolved, Params, Poses, Result, Scene, StageTime, StepReport, Velocities,
+    WantedLevels,
 };
 
 /// A scene of no more colliders runs on the caller's thread: none of its passes is long enough to be shared, and waking
@@ -263,6 +264,7 @@ impl World {
     fn finish(&mut self, attempt: usize, broadphase: Broadphase) {
         self.levels.push(&self.kept.control);
         let mut report = StepReport::from_control(&self.kept.control);
+        report.joints = JointsSolved::of(&self.kept.joint_set.topology);
         report.newly_broken = self.kept.joint_set.newly_broken(&self.kept.control);
         report.backend = "cpu";
         report.adapter = self.adapter.clone();

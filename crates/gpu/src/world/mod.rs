@@ -21,7 +21,9 @@ use tumble_core::edit::EditBatch;
 use tumble_core::layout::{Control, LAST_BATCH, Pair, PoseRecord, StepParams};
 use tumble_core::limits::{self, Room};
 use tumble_core::stopwatch::{Span, Stopwatch};
-use tumble_core::{Editor, JointSet, Params, Poses, Result, Scene, StageRun, StageTime, StepReport, WantedLevels};
+use tumble_core::{
+    Editor, JointSet, JointsSolved, Params, Poses, Result, Scene, StageRun, StageTime, StepReport, WantedLevels,
+};
 
 /// Steps in flight before `step` waits.
 const IN_FLIGHT: usize = 3;
@@ -313,6 +315,7 @@ impl World {
 
     fn report(&self) -> StepReport {
         let mut report = StepReport::from_control(&self.last);
+        report.joints = JointsSolved::of(&self.last_joints.topology);
         report.newly_broken = self.last_joints.newly_broken(&self.last);
         report.backend = "gpu";
         report.adapter = format!("{}, {}", self.gpu.info.name, self.gpu.info.driver_info);
