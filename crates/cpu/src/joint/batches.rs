@@ -7,8 +7,9 @@
 
 use super::drive::kind;
 use super::frame::{frame, used};
+use super::inertia::{inverse_inertia, own_arm, stiffening};
 use super::island::{REGULARIZATION, Scene, Store};
-use super::rows::{Body, Work, inverse_inertia, own_arm, stiffening};
+use super::rows::{Body, Work};
 use crate::math::vec3;
 use glam::{Mat3, Vec3};
 use tumble_core::layout::{JointBody, JointState, SolverBody, StepParams};
@@ -80,7 +81,7 @@ impl Loose {
         let slots = [joint.body_a, joint.body_b];
         let own = Self { bodies: slots, ..Self::default() };
         let [a, b] = slots.map(|slot| Body::of(&bodies.get(slot as usize), &scene.states[slot as usize]));
-        if a.inverse_mass == 0.0 && b.inverse_mass == 0.0 {
+        if !(a.moves || b.moves) {
             return (own, state);
         }
         let mut work = Work::new(slot, joint, state, between(scene, slots), step.h);
@@ -210,7 +211,7 @@ pub fn stiffen(
 ) {
     let slot = info.body as usize;
     let (seen, mut more) = (Body::of(body, &scene.states[slot]), Mat3::ZERO);
-    if seen.inverse_mass == 0.0 {
+    if !seen.moves {
         return;
     }
     let topology = &scene.set.topology;

@@ -5,7 +5,8 @@
 //! inertia includes the geometric stiffness of all joints of a body: a force held at its old arm makes a light body stiff,
 //! and no exact solver survives that.
 
-use super::rows::{Body, Work, inverse_inertia, own_arm, stiffening};
+use super::inertia::{inverse_inertia, own_arm, stiffening};
+use super::rows::{Body, Work, scaled};
 use crate::math::{quat, vec3};
 use glam::{Mat3, Vec3};
 use tumble_core::layout::{
@@ -220,7 +221,7 @@ impl Island {
         for (index, at) in self.joints_at.iter().enumerate() {
             let props = &scene.props[self.slots[index] as usize];
             let body = &mut self.bodies[index];
-            if body.inverse_mass == 0.0 {
+            if !body.moves {
                 continue;
             }
             let mut more = Mat3::ZERO;
@@ -286,7 +287,7 @@ impl Island {
             let (turn, turn_sign) = if first[0] == slot { (row.turn_a, -1.0) } else { (row.turn_b, 1.0) };
             let (response, sign) = if first[1] == slot { (column.response_a, -1.0) } else { (column.response_b, 1.0) };
             let index = self.ends[i][usize::from(first[0] != slot)];
-            let along = row.along.transpose() * column.along * self.bodies[index].inverse_mass;
+            let along = row.along.transpose() * scaled(self.bodies[index].inverse_mass, column.along);
             value += (along + turn.transpose() * response) * (turn_sign * sign);
         }
         value
@@ -353,7 +354,7 @@ impl Island {
             let (joint, which) = place(&info, block.row);
             self.works[joint].blocks[which].push = self.values[k];
         }
-        for (body, at) in self.bodies.iter_mut().zip(&self.joints_at).filter(|(body, _)| body.inverse_mass > 0.0) {
+        for (body, at) in self.bodies.iter_mut().zip(&self.joints_at).filter(|(body, _)| body.moves) {
             let mut way = Body { linear: Vec3::ZERO, angular: Vec3::ZERO, ..*body };
             for &end in at {
                 self.works[end as usize / 2].push(end & 1 == 1, &mut way);

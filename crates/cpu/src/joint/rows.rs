@@ -6,10 +6,11 @@
 
 use super::drive::{AxisState, Piece, kind, piece};
 use super::frame::{Frame, Pose, frame, used};
-use crate::math::{quat, rotate, vec3};
+use super::inertia::inverse_inertia_of;
+use crate::math::{free, is_locked, quat, vec3};
 use bytemuck::Zeroable;
 use glam::{Mat3, Quat, Vec3};
-use tumble_core::layout::{BodyProps, BodyState, Joint, JointState, SolverBody, joint_bits};
+use tumble_core::layout::{BodyState, Joint, JointState, SolverBody, joint_bits, touched};
 
 /// A body as joints see it.
 #[derive(Debug, Clone, Copy)]
@@ -18,10 +19,14 @@ pub struct Body {
     pub linear: Vec3,
     /// rad/s.
     pub angular: Vec3,
-    /// 1/kg.
-    pub inverse_mass: f32,
-    /// 1/(kg m²), in the world, geometric stiffness included.
+    /// 1/kg along the world's axes; zero along those that are locked.
+    pub inverse_mass: Vec3,
+    /// 1/(kg m²), in the world, geometric stiffness included; zero about locked axes.
     pub inverse_inertia: Mat3,
+    /// Whether anything pushes it.
+    pub moves: bool,
+    /// Whether it moves, and is held along or about an axis of the world.
+    pub is_held: bool,
     /// Where it is.
     pub pose: Pose,
 }
@@ -42,16 +47,8 @@ impl Pose {
 impl Body {
     /// As the solver has it.
     pub fn of(body: &SolverBody, state: &BodyState) -> Self {
-        Self {
-            linear: vec3(body.linear_velocity),
-            angular: vec3(body.angular_velocity),
-            inverse_mass: body.inverse_mass,
-            inverse_inertia: inverse_inertia_of(body),
-            pose: Pose {
-                translation: vec3(body.translation),
-                rotation: (quat(body.delta) * quat(state.rotation)).normalize(),
-            },
-        }
+        let rotation = (quat(body.delta) * quat(state.rotation)).normalize();
+        Self { pose: Pose { translation: vec3(body.translation), rotation }, ..Self::still(body) }
     }
 
     /// The same without its pose.
@@ -59,8 +56,10 @@ impl Body {
         Self {
             linear: vec3(body.linear_velocity),
             angular: vec3(body.angular_velocity),
-            inverse_mass: body.inverse_mass,
+            inverse_mass: body.inverse_mass * free(body.touched, touched::FIRST_LOCK),
             inverse_inertia: inverse_inertia_of(body),
+            moves: body.inverse_mass > 0.0,
+            is_held: body.inverse_mass > 0.0 && (is_locked(body) || body.inverse_inertia_diagonal.contains(&0.0)),
             pose: Pose { translation: Vec3::ZERO, rotation: Quat::IDENTITY },
         }
     }
@@ -72,21 +71,6 @@ impl Body {
         body.angular_start = (vec3(body.angular_start) + (self.angular - angular)).to_array();
         body.linear_velocity = self.linear.to_array();
         body.angular_velocity = self.angular.to_array();
-    }
-
-    /// The solver's body with this inertia. What contacts will add again to its angular velocity is what their torques do
-    /// to the new inertia: that of a light body may have changed a hundredfold.
-    pub fn put_inertia(&self, mut body: SolverBody) -> SolverBody {
-        let before = inverse_inertia_of(&body);
-        let carried = vec3(body.angular_velocity) - vec3(body.angular_start);
-        if before.determinant() > 0.0 && carried != Vec3::ZERO {
-            let carried = self.inverse_inertia * (before.inverse() * carried);
-            body.angular_start = (vec3(body.angular_velocity) - carried).to_array();
-        }
-        let i = self.inverse_inertia;
-        body.inverse_inertia_diagonal = [i.x_axis.x, i.y_axis.y, i.z_axis.z];
-        body.inverse_inertia_off = [i.x_axis.y, i.x_axis.z, i.y_axis.z];
-        body
     }
 
     /// Where it is after h, as far as its velocities tell.
@@ -101,10 +85,9 @@ impl Body {
     }
 }
 
-fn inverse_inertia_of(body: &SolverBody) -> Mat3 {
-    let [xx, yy, zz] = body.inverse_inertia_diagonal;
-    let [xy, xz, yz] = body.inverse_inertia_off;
-    Mat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz])
+/// Each column of the matrix times `scale`, axis by axis.
+pub fn scaled(scale: Vec3, m: Mat3) -> Mat3 {
+    Mat3::from_cols(scale * m.x_axis, scale * m.y_axis, scale * m.z_axis)
 }
 
 /// Up to three rows.
@@ -162,7 +145,7 @@ impl Block {
 
     /// The block on the diagonal of the system; rows that are not active have a one.
     pub fn diagonal(&self, a: &Body, b: &Body, regularization: f32) -> Mat3 {
-        let mut k = self.along.transpose() * self.along * (a.inverse_mass + b.inverse_mass)
+        let mut k = self.along.transpose() * scaled(a.inverse_mass + b.inverse_mass, self.along)
             + self.turn_a.transpose() * self.response_a
             + self.turn_b.transpose() * self.response_b;
         let more = regularization / 3.0 * (k.x_axis.x + k.y_axis.y + k.z_axis.z);
@@ -232,7 +215,7 @@ impl Work {
                 let (turn_a, turn_b) = if which == 0 { (arm_a.cross(axis), arm_b.cross(axis)) } else { (axis, axis) };
                 let (response_a, response_b) = (a.inverse_inertia * turn_a, b.inverse_inertia * turn_b);
                 let push = if which == 0 { axis } else { Vec3::ZERO };
-                block.own[row] = push.dot(push) * masses + turn_a.dot(response_a) + turn_b.dot(response_b);
+                block.own[row] = push.dot(masses * push) + turn_a.dot(response_a) + turn_b.dot(response_b);
                 let active = block.pieces[row].kind != kind::FIXED;
                 let set = |m: &mut Mat3, v: Vec3| *m.col_mut(row) = if active { v } else { Vec3::ZERO };
                 set(&mut block.along, push);
@@ -458,30 +441,3 @@ pub const LEAST: f32 = 0.3;
 pub const JUMP: f32 = 0.2;
 /// Springs that differ by no more than this share are one.
 pub const SAME_SPRING: f32 = 0.1;
-/// Share of the geometric stiffness that joints add to the inertia.
-pub const STIFFENING: f32 = 2.0;
-
-/// Geometric stiffness of a joint at one of its bodies, as inertia over a sub-step: what a force at an arm does when the
-/// arm turns.
-pub fn stiffening(arm: Vec3, impulse: Vec3, h: f32) -> Mat3 {
-    let (pull, square) = (arm.dot(impulse), arm.dot(arm));
-    if pull <= 0.0 || square == 0.0 {
-        return Mat3::ZERO;
-    }
-    let outer = Mat3::from_cols(arm * arm.x, arm * arm.y, arm * arm.z);
-    (Mat3::IDENTITY - outer * (1.0 / square)) * (STIFFENING * h * pull)
-}
-
-/// The inertia of a body in the world with that of all its joints, inverted; zero where nothing turns it.
-pub fn inverse_inertia(rotation: Quat, props: &BodyProps, stiffening: Mat3) -> Mat3 {
-    let r = Mat3::from_quat(rotation);
-    if stiffening == Mat3::ZERO || vec3(props.inverse_inertia) == Vec3::ZERO {
-        return r * Mat3::from_diagonal(vec3(props.inverse_inertia)) * r.transpose();
-    }
-    (r * Mat3::from_diagonal(vec3(props.inertia)) * r.transpose() + stiffening).inverse()
-}
-
-/// The arm of a joint at a body, from its centre of mass to its own anchor, m.
-pub fn own_arm(joint: &Joint, second: bool, rotation: Quat) -> Vec3 {
-    rotate(rotation, vec3(if second { joint.anchor_b } else { joint.anchor_a }))
-}
