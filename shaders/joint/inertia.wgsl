@@ -1,5 +1,5 @@
-// The inertia of bodies with the geometric stiffness of their joints. Twin of the same functions in
-// crates/cpu/src/joint/rows.rs. Imported by `joint/island` and `joint/batches`; reads and writes what `joint/rows` names.
+// The inertia of bodies with the geometric stiffness of their joints. Twin of
+// crates/cpu/src/joint/inertia.rs. Imported by `joint/island` and `joint/batches`; reads and writes what `joint/rows` names.
 
 //#import joint/rows.wgsl
 
@@ -25,6 +25,40 @@ fn joint_body(index: u32) -> JointBody {
     return JointBody(joint_tables[at], joint_tables[at + 1u], joint_tables[at + 2u], joint_tables[at + 3u]);
 }
 
+// The matrix with ones on the diagonal for rows and columns that are zero: what is held about an axis can be inverted.
+fn unheld(m: mat3x3<f32>) -> mat3x3<f32> {
+    var all = m;
+    for (var axis = 0u; axis < 3u; axis++) {
+        all[axis][axis] = select(m[axis][axis], 1.0, m[axis][axis] == 0.0);
+    }
+    return all;
+}
+
+// The inertia of a body in the world with that of all its joints, inverted; zero where nothing turns it. Of one that is
+// held about axes, the rows and columns of the others alone are inverted.
+fn inverse_inertia(slot: u32, rotation: vec4<f32>, more: mat3x3<f32>) -> mat3x3<f32> {
+    let r = mat3_from_quat(rotation);
+    let i = props[slot].inverse_inertia;
+    let p = props[slot].inertia;
+    let stiff = any(more[0] != vec3<f32>()) || any(more[1] != vec3<f32>()) || any(more[2] != vec3<f32>());
+    let held = three_bits(props[slot].locked, LOCKED_FIRST_ROTATION);
+    if any(held) && !stiff {
+        return held_inverse_inertia(rotation, p, held);
+    }
+    if !stiff || all(i == vec3<f32>()) {
+        return mat3x3<f32>(r[0] * i.x, r[1] * i.y, r[2] * i.z) * transpose(r);
+    }
+    let inertia = mat3x3<f32>(r[0] * p.x, r[1] * p.y, r[2] * p.z) * transpose(r) + more;
+    if !any(held) {
+        return inverse3(inertia);
+    }
+    let free = select(vec3<f32>(1.0), vec3<f32>(), held);
+    let both = mat3x3<f32>(free * free.x, free * free.y, free * free.z);
+    let left = mat3x3<f32>(inertia[0] * both[0], inertia[1] * both[1], inertia[2] * both[2]);
+    let inverse = inverse3(unheld(left));
+    return mat3x3<f32>(inverse[0] * both[0], inverse[1] * both[1], inverse[2] * both[2]);
+}
+
 // The body's inertia with the geometric stiffness of its joints. What contacts will add again to its angular velocity is
 // what their torques do to the new inertia.
 fn stiffen(index: u32) {
@@ -43,15 +77,8 @@ fn stiffen(index: u32) {
         let impulse = select(-joint_states[joint].impulse, joint_states[joint].impulse, second);
         more += stiffening(arm, impulse, step.h);
     }
-    let r = mat3_from_quat(rotation);
-    let i = props[slot].inverse_inertia;
-    var inertia = mat3x3<f32>(r[0] * i.x, r[1] * i.y, r[2] * i.z) * transpose(r);
-    let stiff = any(more[0] != vec3<f32>()) || any(more[1] != vec3<f32>()) || any(more[2] != vec3<f32>());
-    if stiff && any(i != vec3<f32>()) {
-        let p = props[slot].inertia;
-        inertia = inverse3(mat3x3<f32>(r[0] * p.x, r[1] * p.y, r[2] * p.z) * transpose(r) + more);
-    }
-    let before = inverse_inertia_of(slot);
+    let inertia = inverse_inertia(slot, rotation, more);
+    let before = unheld(inverse_inertia_of(slot));
     let carried = solver_bodies[slot].angular_velocity - solver_bodies[slot].angular_start;
     if determinant(before) > 0.0 && any(carried != vec3<f32>()) {
         solver_bodies[slot].angular_start = solver_bodies[slot].angular_velocity - inertia * (inverse3(before) * carried);

@@ -127,9 +127,10 @@ fn coupling(entry: JointEntry) -> mat3x3<f32> {
         if first_j {
             response = joint_works[j].rows[column & 1u].response_a;
         }
-        let along = transpose(joint_works[i].rows[row & 1u].along) * joint_works[j].rows[column & 1u].along;
+        let pushed = scaled(inverse_masses(slot), joint_works[j].rows[column & 1u].along);
+        let along = transpose(joint_works[i].rows[row & 1u].along) * pushed;
         let sign = select(-1.0, 1.0, first_i == first_j);
-        value += (along * solver_bodies[slot].inverse_mass + transpose(turns) * response) * sign;
+        value += (along + transpose(turns) * response) * sign;
     }
     return value;
 }
@@ -250,7 +251,7 @@ fn project_bodies(island: JointIsland, lid: u32) {
         if solver_bodies[slot].inverse_mass > 0.0 {
             let angle = sqrt(dot(angular, angular));
             let half = angular * select(0.5, 0.5 * MAX_PROJECTION / angle, angle > MAX_PROJECTION);
-            solver_bodies[slot].translation += solver_bodies[slot].inverse_mass * linear;
+            solver_bodies[slot].translation += inverse_masses(slot) * linear;
             solver_bodies[slot].delta = unit(multiply(unit(vec4<f32>(half, 1.0)), solver_bodies[slot].delta));
         }
     }

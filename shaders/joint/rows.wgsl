@@ -6,6 +6,7 @@
 
 //#import joint/drive.wgsl
 //#import joint/frame.wgsl
+//#import joint/held.wgsl
 //#import shared/body.wgsl
 //#import shared/control.wgsl
 //#import shared/joint.wgsl
@@ -103,19 +104,6 @@ fn inverse_inertia_of(slot: u32) -> mat3x3<f32> {
     return mat3x3<f32>(vec3<f32>(d.x, o.x, o.y), vec3<f32>(o.x, d.y, o.z), vec3<f32>(o.y, o.z, d.z));
 }
 
-// The inverse by cross products; zero where there is none.
-fn inverse3(m: mat3x3<f32>) -> mat3x3<f32> {
-    let yz = cross(m[1], m[2]);
-    let zx = cross(m[2], m[0]);
-    let xy = cross(m[0], m[1]);
-    let determinant = dot(m[2], xy);
-    if determinant == 0.0 {
-        return mat3x3<f32>();
-    }
-    let s = 1.0 / determinant;
-    return transpose(mat3x3<f32>(yz * s, zx * s, xy * s));
-}
-
 // A vector along v and a turn by it: the tangent of half the angle, one order further.
 fn predicted_rotation(body: Seen, h: f32) -> vec4<f32> {
     let half = 0.5 * h * body.angular;
@@ -197,7 +185,6 @@ fn look(place: u32) {
 fn rebuild(place: u32) {
     let ia = joint_works[place].body_a;
     let ib = joint_works[place].body_b;
-    let masses = solver_bodies[ia].inverse_mass + solver_bodies[ib].inverse_mass;
     for (var blocks = blocks_in_use(joint_works[place].axes); blocks != 0u; blocks &= blocks - 1u) {
         let which = firstTrailingBit(blocks);
         var own: vec3<f32>;
@@ -214,7 +201,7 @@ fn rebuild(place: u32) {
             }
             let response_a = turn_response(ia, turn_a);
             let response_b = turn_response(ib, turn_b);
-            own[row] = dot(push, push) * masses + dot(turn_a, response_a) + dot(turn_b, response_b);
+            own[row] = own_answer(ia, push, turn_a, response_a) + own_answer(ib, push, turn_b, response_b);
             let is_active = f32(joint_works[place].rows[which].kinds[row] != PIECE_FIXED);
             joint_works[place].rows[which].along[row] = push * is_active;
             joint_works[place].rows[which].turn_a[row] = turn_a * is_active;
@@ -429,7 +416,7 @@ fn fixed_push_of(end: u32, body: u32) -> Push {
 
 // Adds to a body's velocities; what joints add is no load of contacts.
 fn add_velocities(slot: u32, linear: vec3<f32>, angular: vec3<f32>) {
-    let way = solver_bodies[slot].inverse_mass * linear;
+    let way = inverse_masses(slot) * linear;
     solver_bodies[slot].linear_velocity += way;
     solver_bodies[slot].linear_start += way;
     solver_bodies[slot].angular_velocity += angular;
@@ -440,11 +427,13 @@ fn add_velocities(slot: u32, linear: vec3<f32>, angular: vec3<f32>) {
 fn diagonal_block(place: u32, which: u32) -> mat3x3<f32> {
     let ia = joint_works[place].body_a;
     let ib = joint_works[place].body_b;
-    let masses = solver_bodies[ia].inverse_mass + solver_bodies[ib].inverse_mass;
     let along = joint_works[place].rows[which].along;
-    var k = transpose(along) * along * masses
+    var k = transpose(along) * scaled(inverse_masses(ia) + inverse_masses(ib), along)
         + transpose(joint_works[place].rows[which].turn_a) * joint_works[place].rows[which].response_a
         + transpose(joint_works[place].rows[which].turn_b) * joint_works[place].rows[which].response_b;
+    if is_held(ia) || is_held(ib) {
+        k += ghost(place, which);
+    }
     let in_cycle = (joints[joint_works[place].slot].flags & JOINT_IN_CYCLE) != 0u;
     let more = select(REGULARIZATION, CYCLE_REGULARIZATION, in_cycle) / 3.0 * (k[0].x + k[1].y + k[2].z);
     let kinds = joint_works[place].rows[which].kinds;

@@ -23,6 +23,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("joint/batches", include_str!("../joint/batches.wgsl")),
     ("joint/drive", include_str!("../joint/drive.wgsl")),
     ("joint/frame", include_str!("../joint/frame.wgsl")),
+    ("joint/held", include_str!("../joint/held.wgsl")),
     ("joint/inertia", include_str!("../joint/inertia.wgsl")),
     ("joint/island", include_str!("../joint/island.wgsl")),
     ("joint/rows", include_str!("../joint/rows.wgsl")),

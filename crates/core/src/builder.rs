@@ -152,8 +152,8 @@ impl RigidBodyBuilder {
     }
 
     /// Along which of the world's axes a dynamic body may move; all at first. Along the others nothing moves it, and it has no
-    /// velocity there, whatever it is given: to what pushes it so, it is as heavy as the world. Bodies with locked axes cannot
-    /// be joined: a generic joint to a fixed body holds axes too.
+    /// velocity there, whatever it is given: to what pushes it so, be it a contact or a joint, it is as heavy as the world. A
+    /// joint whose two bodies both do not move along some direction has no force there.
     pub fn enabled_translations(mut self, x: bool, y: bool, z: bool) -> Self {
         self.enabled_translations = [x, y, z];
         self

@@ -79,7 +79,8 @@ impl JointEdits {
             let moves = |slot: u32| {
                 scene.bodies.at(slot).is_some_and(|(_, body)| body.builder.body_type == RigidBodyType::Dynamic)
             };
-            topology = Arc::new(Topology::new(&mut joints, &moves, solver));
+            let held = |slot: u32| scene.bodies.at(slot).is_some_and(|(_, body)| body.builder.locked() != 0);
+            topology = Arc::new(Topology::new(&mut joints, &moves, &held, solver));
         }
         self.set = Arc::new(JointSet { joints, topology });
         self.set.clone()

@@ -115,8 +115,8 @@ impl Scene {
     /// Joins two bodies.
     ///
     /// # Errors
-    /// [`Error::Invalid`] names the value that is not allowed: bodies that are one, that nothing moves, or that have locked
-    /// axes; axes, limits, motors. [`Error::StaleBody`] for bodies that are no more.
+    /// [`Error::Invalid`] names the value that is not allowed: bodies that are one, or that nothing moves;
+    /// axes, limits, motors. [`Error::StaleBody`] for bodies that are no more.
     pub fn insert_joint(&mut self, body1: BodyHandle, body2: BodyHandle, joint: JointBuilder) -> Result<JointHandle> {
         self.check_count("joints", self.joints.len())?;
         let what = || format!("joint {} between {body1} and {body2}", self.joints.live());
@@ -130,13 +130,6 @@ impl Scene {
             format!("{kinds:?}"),
             "at least one dynamic body: nothing else is moved by a joint",
         )?;
-        for body in [body1, body2] {
-            let builder = &self.entry(body)?.builder;
-            let held = builder.body_type == RigidBodyType::Dynamic && builder.locked() != 0;
-            const FREE: &str = "bodies without locked axes: joints see the whole mass. A `JointBuilder::generic` to a fixed body \
-                                holds axes too";
-            check(!held, what, "locked axes", body, FREE)?;
-        }
         joint.validate(&what)?;
         let (slot, generation) = self.joints.insert(JointEntry { builder: joint, bodies: [body1, body2] });
         let handle = JointHandle { slot, generation };

@@ -60,15 +60,21 @@ pub struct Topology {
 }
 
 impl Topology {
-    /// How `joints` (by slot) are solved between bodies of which `moves` can be moved. Marks joints on cycles.
-    pub fn new(joints: &mut [Joint], moves: &impl Fn(u32) -> bool, solver: JointSolver) -> Self {
+    /// How `joints` (by slot) are solved between bodies of which `moves` can be moved, and `held` are held by the world along
+    /// or about some axes. Marks joints on cycles.
+    pub fn new(
+        joints: &mut [Joint],
+        moves: &impl Fn(u32) -> bool,
+        held: &impl Fn(u32) -> bool,
+        solver: JointSolver,
+    ) -> Self {
         let mut topology = Self::default();
         let alive: Vec<u32> =
             (0..joints.len() as u32).filter(|&j| joints[j as usize].flags & joint_bits::ALIVE != 0).collect();
         let mut large = Vec::new();
         for island in islands(joints, &alive, moves) {
             topology.island_count += 1;
-            mark_cycles(joints, &island, moves);
+            mark_cycles(joints, &island, moves, held);
             let direct = match solver {
                 JointSolver::GaussSeidel => None,
                 JointSolver::Auto | JointSolver::Direct => order(joints, &island, moves),
@@ -337,8 +343,8 @@ fn islands(joints: &[Joint], alive: &[u32], moves: &impl Fn(u32) -> bool) -> Vec
 }
 
 /// Marks the joints of an island without which the bodies would still hang together, what does not move being one body:
-/// all edges but the bridges (Tarjan, 1974).
-fn mark_cycles(joints: &mut [Joint], island: &[u32], moves: &impl Fn(u32) -> bool) {
+/// all edges but the bridges (Tarjan, 1974). What the world holds is joined to what does not move.
+fn mark_cycles(joints: &mut [Joint], island: &[u32], moves: &impl Fn(u32) -> bool, held: &impl Fn(u32) -> bool) {
     let node = |body: u32| if moves(body) { body } else { NO_BODY };
     let mut at: BTreeMap<u32, Vec<(u32, u32)>> = BTreeMap::new();
     for &j in island {
@@ -346,6 +352,11 @@ fn mark_cycles(joints: &mut [Joint], island: &[u32], moves: &impl Fn(u32) -> boo
         at.entry(a).or_default().push((j, b));
         at.entry(b).or_default().push((j, a));
         joints[j as usize].flags |= joint_bits::IN_CYCLE;
+    }
+    let by_world: Vec<u32> = at.keys().copied().filter(|&body| body != NO_BODY && held(body)).collect();
+    for (edge, body) in (joints.len() as u32..).zip(by_world) {
+        at.entry(body).or_default().push((edge, NO_BODY));
+        at.entry(NO_BODY).or_default().push((edge, body));
     }
     let Some((&start, _)) = at.first_key_value() else { return };
     let mut found: BTreeMap<u32, u32> = BTreeMap::from([(start, 0)]);
@@ -372,8 +383,10 @@ fn mark_cycles(joints: &mut [Joint], island: &[u32], moves: &impl Fn(u32) -> boo
         if let Some(&(parent, ..)) = path.last() {
             let lowest = low[&body].min(low[&parent]);
             low.insert(parent, lowest);
-            if low[&body] > found[&parent] {
-                joints[by as usize].flags &= !joint_bits::IN_CYCLE;
+            if low[&body] > found[&parent]
+                && let Some(joint) = joints.get_mut(by as usize)
+            {
+                joint.flags &= !joint_bits::IN_CYCLE;
             }
         }
     }

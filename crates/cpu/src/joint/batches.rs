@@ -81,7 +81,7 @@ impl Loose {
         let slots = [joint.body_a, joint.body_b];
         let own = Self { bodies: slots, ..Self::default() };
         let [a, b] = slots.map(|slot| Body::of(&bodies.get(slot as usize), &scene.states[slot as usize]));
-        if !(a.moves || b.moves) {
+        if !(a.moves() || b.moves()) {
             return (own, state);
         }
         let mut work = Work::new(slot, joint, state, between(scene, slots), step.h);
@@ -211,7 +211,7 @@ pub fn stiffen(
 ) {
     let slot = info.body as usize;
     let (seen, mut more) = (Body::of(body, &scene.states[slot]), Mat3::ZERO);
-    if !seen.moves {
+    if !seen.moves() {
         return;
     }
     let topology = &scene.set.topology;

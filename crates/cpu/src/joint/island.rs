@@ -5,8 +5,9 @@
 //! inertia includes the geometric stiffness of all joints of a body: a force held at its old arm makes a light body stiff,
 //! and no exact solver survives that.
 
+use super::held::scaled;
 use super::inertia::{inverse_inertia, own_arm, stiffening};
-use super::rows::{Body, Work, scaled};
+use super::rows::{Body, Work};
 use crate::math::{quat, vec3};
 use glam::{Mat3, Vec3};
 use tumble_core::layout::{
@@ -221,7 +222,7 @@ impl Island {
         for (index, at) in self.joints_at.iter().enumerate() {
             let props = &scene.props[self.slots[index] as usize];
             let body = &mut self.bodies[index];
-            if !body.moves {
+            if !body.moves() {
                 continue;
             }
             let mut more = Mat3::ZERO;
@@ -354,7 +355,7 @@ impl Island {
             let (joint, which) = place(&info, block.row);
             self.works[joint].blocks[which].push = self.values[k];
         }
-        for (body, at) in self.bodies.iter_mut().zip(&self.joints_at).filter(|(body, _)| body.moves) {
+        for (body, at) in self.bodies.iter_mut().zip(&self.joints_at).filter(|(body, _)| body.moves()) {
             let mut way = Body { linear: Vec3::ZERO, angular: Vec3::ZERO, ..*body };
             for &end in at {
                 self.works[end as usize / 2].push(end & 1 == 1, &mut way);

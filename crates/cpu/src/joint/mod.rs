@@ -8,6 +8,7 @@
 pub mod batches;
 pub mod drive;
 pub mod frame;
+pub mod held;
 pub mod inertia;
 pub mod island;
 pub mod rows;

@@ -6,6 +6,7 @@
 
 use super::drive::{AxisState, Piece, kind, piece};
 use super::frame::{Frame, Pose, frame, used};
+use super::held::{answer, ghost, scaled};
 use super::inertia::inverse_inertia_of;
 use crate::math::{free, is_locked, quat, vec3};
 use bytemuck::Zeroable;
@@ -23,8 +24,8 @@ pub struct Body {
     pub inverse_mass: Vec3,
     /// 1/(kg m²), in the world, geometric stiffness included; zero about locked axes.
     pub inverse_inertia: Mat3,
-    /// Whether anything pushes it.
-    pub moves: bool,
+    /// 1/kg of what has no locked axis; zero where nothing pushes it.
+    pub whole: f32,
     /// Whether it moves, and is held along or about an axis of the world.
     pub is_held: bool,
     /// Where it is.
@@ -58,7 +59,7 @@ impl Body {
             angular: vec3(body.angular_velocity),
             inverse_mass: body.inverse_mass * free(body.touched, touched::FIRST_LOCK),
             inverse_inertia: inverse_inertia_of(body),
-            moves: body.inverse_mass > 0.0,
+            whole: body.inverse_mass,
             is_held: body.inverse_mass > 0.0 && (is_locked(body) || body.inverse_inertia_diagonal.contains(&0.0)),
             pose: Pose { translation: Vec3::ZERO, rotation: Quat::IDENTITY },
         }
@@ -73,6 +74,19 @@ impl Body {
         body.angular_velocity = self.angular.to_array();
     }
 
+    /// Whether anything pushes it.
+    pub fn moves(&self) -> bool {
+        self.whole > 0.0
+    }
+
+    /// What it answers a row with: a push along `along`, a turn about `turn` and the response to that.
+    fn answer(&self, along: Vec3, turn: Vec3, response: Vec3) -> f32 {
+        let own = along.dot(self.inverse_mass * along) + turn.dot(response);
+        let i = &self.inverse_inertia;
+        let most = if along == Vec3::ZERO { i.x_axis.x + i.y_axis.y + i.z_axis.z } else { self.whole };
+        if self.is_held { answer(own, most) } else { own }
+    }
+
     /// Where it is after h, as far as its velocities tell.
     fn predicted(&self, h: f32) -> Pose {
         let half = 0.5 * h * self.angular;
@@ -83,11 +97,6 @@ impl Body {
         let turn = if square < 1.0 { Quat::from_xyzw(half.x, half.y, half.z, 1.0).normalize() } else { turn };
         Pose { translation: self.pose.translation + h * self.linear, rotation: (turn * self.pose.rotation).normalize() }
     }
-}
-
-/// Each column of the matrix times `scale`, axis by axis.
-pub fn scaled(scale: Vec3, m: Mat3) -> Mat3 {
-    Mat3::from_cols(scale * m.x_axis, scale * m.y_axis, scale * m.z_axis)
 }
 
 /// Up to three rows.
@@ -148,6 +157,9 @@ impl Block {
         let mut k = self.along.transpose() * scaled(a.inverse_mass + b.inverse_mass, self.along)
             + self.turn_a.transpose() * self.response_a
             + self.turn_b.transpose() * self.response_b;
+        if a.is_held || b.is_held {
+            k += ghost(self.along, self.turn_b, a, b);
+        }
         let more = regularization / 3.0 * (k.x_axis.x + k.y_axis.y + k.z_axis.z);
         for row in 0..3 {
             let piece = &self.pieces[row];
@@ -201,7 +213,6 @@ impl Work {
     /// The rows that are active, from the axes.
     pub fn rebuild(&mut self, a: &Body, b: &Body) {
         let Frame { arm_a, arm_b, along, about, .. } = self.frame;
-        let masses = a.inverse_mass + b.inverse_mass;
         for (which, block) in self.blocks.iter_mut().enumerate().filter(|(which, _)| used(self.axes, *which) != 0) {
             let rows = used(self.axes, which);
             for row in 0..3 {
@@ -215,7 +226,7 @@ impl Work {
                 let (turn_a, turn_b) = if which == 0 { (arm_a.cross(axis), arm_b.cross(axis)) } else { (axis, axis) };
                 let (response_a, response_b) = (a.inverse_inertia * turn_a, b.inverse_inertia * turn_b);
                 let push = if which == 0 { axis } else { Vec3::ZERO };
-                block.own[row] = push.dot(masses * push) + turn_a.dot(response_a) + turn_b.dot(response_b);
+                block.own[row] = a.answer(push, turn_a, response_a) + b.answer(push, turn_b, response_b);
                 let active = block.pieces[row].kind != kind::FIXED;
                 let set = |m: &mut Mat3, v: Vec3| *m.col_mut(row) = if active { v } else { Vec3::ZERO };
                 set(&mut block.along, push);
@@ -299,10 +310,14 @@ impl Work {
         for which in (0..2).filter(|&which| used(self.axes, which) != 0) {
             let coordinates = if which == 0 { self.frame.shift } else { self.frame.turn };
             let (rows, block) = (used(self.axes, which), &mut self.blocks[which]);
-            for row in (0..3).filter(|row| rows >> row & 1 != 0 && block.own[*row] > 0.0) {
-                let piece = &mut block.pieces[row];
-                changed |= piece.kind != kind::LOCKED;
-                *piece = Piece { kind: kind::LOCKED, gamma: 0.0, goal: -coordinates[row] / h, off: coordinates[row] };
+            for row in (0..3).filter(|row| rows >> row & 1 != 0) {
+                let new = if block.own[row] > 0.0 {
+                    Piece { kind: kind::LOCKED, gamma: 0.0, goal: -coordinates[row] / h, off: coordinates[row] }
+                } else {
+                    Piece::default()
+                };
+                changed |= block.pieces[row].kind != new.kind;
+                block.pieces[row] = new;
             }
         }
         changed
