@@ -16,6 +16,8 @@ const SHARE: f32 = 0.282;
 const MASS_SHARE: f32 = 0.8974;
 // Share of the impulse that it lets go.
 const LEAK: f32 = 0.1026;
+// The same of a rigid row where its bodies have other joints between them.
+const TWICE_LEAK: f32 = 0.15;
 
 @group(0) @binding(11) var<uniform> batch: vec4<u32>;
 
@@ -96,9 +98,13 @@ fn visit_rows(place: u32, relaxes: bool) {
                 joint_works[place].rows[which].gamma[row], before[row], relaxes);
         }
         var impulse = joint_works[place].rows[which].mass * lacking;
-        if !relaxes {
-            impulse = select(impulse, MASS_SHARE * impulse - LEAK * before, kinds == vec3<u32>(PIECE_LOCKED));
+        var share = MASS_SHARE;
+        var leak = LEAK;
+        if relaxes {
+            share = 1.0;
+            leak = select(0.0, TWICE_LEAK, (joints[joint_works[place].slot].flags & JOINT_TWICE) != 0u);
         }
+        impulse = select(impulse, share * impulse - leak * before, kinds == vec3<u32>(PIECE_LOCKED));
         joint_works[place].rows[which].impulse = before + impulse;
         push_along(place, which, impulse);
     }

@@ -10,6 +10,8 @@ const JOINT_COUPLED: u32 = 2u;
 const JOINT_IN_CYCLE: u32 = 4u;
 const JOINT_SOFT: u32 = 8u;
 const JOINT_APART: u32 = 16u;
+const JOINT_HELD: u32 = 32u;
+const JOINT_TWICE: u32 = 64u;
 const JOINT_FORCE_BASED: u32 = 8u;
 const NO_BODY: u32 = 0xffffffffu;
 

@@ -151,6 +151,12 @@ pub(crate) fn pack_joint(scene: &Scene, handle: JointHandle) -> Result<Joint> {
     let (anchor_a, rotation_a) = placed(body1, builder.local_anchor1, builder.local_rotation1)?;
     let (anchor_b, rotation_b) = placed(body2, builder.local_anchor2, builder.local_rotation2)?;
     let (mut axes, mut flags) = (0, joint_bits::ALIVE);
+    let is_held = |body: BodyHandle| {
+        scene.body(body).is_ok_and(|body| body.body_type == RigidBodyType::Dynamic && body.locked() != 0)
+    };
+    if is_held(body1) || is_held(body2) {
+        flags |= joint_bits::HELD;
+    }
     let mut drives = [JointDrive::zeroed(); 6];
     for axis in JointAxis::ALL.map(|axis| axis as usize) {
         let drive = &mut drives[axis];

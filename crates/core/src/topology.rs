@@ -61,7 +61,7 @@ pub struct Topology {
 
 impl Topology {
     /// How `joints` (by slot) are solved between bodies of which `moves` can be moved, and `held` are held by the world along
-    /// or about some axes. Marks joints on cycles.
+    /// or about some axes. Marks joints on cycles, and those of which a pair has several.
     pub fn new(
         joints: &mut [Joint],
         moves: &impl Fn(u32) -> bool,
@@ -75,6 +75,7 @@ impl Topology {
         for island in islands(joints, &alive, moves) {
             topology.island_count += 1;
             mark_cycles(joints, &island, moves, held);
+            mark_twice(joints, &island, moves);
             let direct = match solver {
                 JointSolver::GaussSeidel => None,
                 JointSolver::Auto | JointSolver::Direct => order(joints, &island, moves),
@@ -388,6 +389,22 @@ fn mark_cycles(joints: &mut [Joint], island: &[u32], moves: &impl Fn(u32) -> boo
             {
                 joint.flags &= !joint_bits::IN_CYCLE;
             }
+        }
+    }
+}
+
+/// Marks the joints of an island whose bodies have others between them, what does not move being one body.
+fn mark_twice(joints: &mut [Joint], island: &[u32], moves: &impl Fn(u32) -> bool) {
+    let node = |body: u32| if moves(body) { body } else { NO_BODY };
+    let mut between: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
+    for &j in island {
+        let [a, b] = [joints[j as usize].body_a, joints[j as usize].body_b].map(node);
+        between.entry([a.min(b), a.max(b)]).or_default().push(j);
+    }
+    for all in between.values() {
+        for &j in all {
+            let flags = &mut joints[j as usize].flags;
+            *flags = if all.len() > 1 { *flags | joint_bits::TWICE } else { *flags & !joint_bits::TWICE };
         }
     }
 }

@@ -20,6 +20,10 @@ pub mod joint_bits {
     pub const SOFT: u32 = 8;
     /// Flag: the joined bodies do not collide.
     pub const APART: u32 = 16;
+    /// Flag: the world holds one of its bodies along or about some axes.
+    pub const HELD: u32 = 32;
+    /// Flag: its bodies have other joints between them, what does not move being one body.
+    pub const TWICE: u32 = 64;
     /// Flag: the motor of axis k is force based: bit k + 8.
     pub const FORCE_BASED: u32 = 8;
 }

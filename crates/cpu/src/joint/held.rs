@@ -34,7 +34,13 @@ pub fn ghost(along: Mat3, about: Mat3, a: &Body, b: &Body) -> Mat3 {
     rows.transpose() * scaled(held, rows)
 }
 
+/// What pushes along the columns of `with` do along those of `along`: by a body, of which the mass is `whole`, or less along
+/// axes that are locked. (Where none is, in the order of operations of what is solved in lanes.)
+pub fn pushed(along: &Mat3, with: &Mat3, inverse_mass: Vec3, whole: f32, is_held: bool) -> Mat3 {
+    if is_held { along.transpose() * scaled(inverse_mass, *with) } else { along.transpose() * *with * whole }
+}
+
 /// Each column of the matrix times `scale`, axis by axis.
-pub fn scaled(scale: Vec3, m: Mat3) -> Mat3 {
+fn scaled(scale: Vec3, m: Mat3) -> Mat3 {
     Mat3::from_cols(scale * m.x_axis, scale * m.y_axis, scale * m.z_axis)
 }

@@ -5,7 +5,7 @@
 //! inertia includes the geometric stiffness of all joints of a body: a force held at its old arm makes a light body stiff,
 //! and no exact solver survives that.
 
-use super::held::scaled;
+use super::held::pushed;
 use super::inertia::{inverse_inertia, own_arm, stiffening};
 use super::rows::{Body, Work};
 use crate::math::{quat, vec3};
@@ -294,7 +294,8 @@ impl Island {
             let (turn, turn_sign) = if first[0] == slot { (row.turn_a, -1.0) } else { (row.turn_b, 1.0) };
             let (response, sign) = if first[1] == slot { (column.response_a, -1.0) } else { (column.response_b, 1.0) };
             let index = self.ends[i][usize::from(first[0] != slot)];
-            let along = row.along.transpose() * scaled(self.bodies[index].inverse_mass, column.along);
+            let body = &self.bodies[index];
+            let along = pushed(&row.along, &column.along, body.inverse_mass, body.whole, body.is_held);
             value += (along + turn.transpose() * response) * (turn_sign * sign);
         }
         value

@@ -6,7 +6,7 @@
 
 use super::drive::{AxisState, Piece, kind, piece};
 use super::frame::{Frame, Pose, frame, used};
-use super::held::{answer, ghost, scaled};
+use super::held::{answer, ghost, pushed};
 use super::inertia::inverse_inertia_of;
 use crate::math::{free, is_locked, quat, vec3};
 use bytemuck::Zeroable;
@@ -154,10 +154,11 @@ impl Block {
 
     /// The block on the diagonal of the system; rows that are not active have a one.
     pub fn diagonal(&self, a: &Body, b: &Body, regularization: f32) -> Mat3 {
-        let mut k = self.along.transpose() * scaled(a.inverse_mass + b.inverse_mass, self.along)
+        let is_held = a.is_held || b.is_held;
+        let mut k = pushed(&self.along, &self.along, a.inverse_mass + b.inverse_mass, a.whole + b.whole, is_held)
             + self.turn_a.transpose() * self.response_a
             + self.turn_b.transpose() * self.response_b;
-        if a.is_held || b.is_held {
+        if is_held {
             k += ghost(self.along, self.turn_b, a, b);
         }
         let more = regularization / 3.0 * (k.x_axis.x + k.y_axis.y + k.z_axis.z);
@@ -226,7 +227,11 @@ impl Work {
                 let (turn_a, turn_b) = if which == 0 { (arm_a.cross(axis), arm_b.cross(axis)) } else { (axis, axis) };
                 let (response_a, response_b) = (a.inverse_inertia * turn_a, b.inverse_inertia * turn_b);
                 let push = if which == 0 { axis } else { Vec3::ZERO };
-                block.own[row] = a.answer(push, turn_a, response_a) + b.answer(push, turn_b, response_b);
+                block.own[row] = if a.is_held || b.is_held {
+                    a.answer(push, turn_a, response_a) + b.answer(push, turn_b, response_b)
+                } else {
+                    push.dot(push) * (a.whole + b.whole) + turn_a.dot(response_a) + turn_b.dot(response_b)
+                };
                 let active = block.pieces[row].kind != kind::FIXED;
                 let set = |m: &mut Mat3, v: Vec3| *m.col_mut(row) = if active { v } else { Vec3::ZERO };
                 set(&mut block.along, push);
