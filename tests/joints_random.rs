@@ -1,7 +1,8 @@
-//! Random trees and loops of bodies on joints of all kinds, with limits, friction, masses of 1 : 1000 and wild starts: the
-//! state stays finite, joints hold, no energy comes from anywhere. Oracle: analysis for the energy. Of 60 scenes with equal
-//! masses none gains any; with masses of 1 : 1000 up to 4 do (rapier: 28 to 35), where several limits hold in a corner, and
-//! up to 11 come apart by more than 5 mm (rapier: 57 to 60).
+//! Random trees and loops of bodies on joints of all kinds, with limits, friction, masses of 1 : 1000, wild starts, pairs that
+//! are joined twice and bodies that the world holds: the state stays finite, joints hold, no energy comes from anywhere.
+//! Oracle: analysis for the energy. Of 120 scenes with equal masses none gains any; of 240 with masses of 1 : 1000 four do
+//! (rapier: 28 to 40 of 40), where several limits hold in a corner, and 30 come apart by more than 5 mm (rapier: 39 to 40 of
+//! 40). Bounds are for the middle of 40 scenes, which chance does not move by more than a third, or leave out a few.
 
 #[expect(dead_code, reason = "this program uses a part")]
 #[path = "common/beside.rs"]
@@ -130,13 +131,9 @@ fn scene(seed: u64, recipe: Recipe) -> Scene {
     for _ in 0..recipe.loops {
         let a = random.below(count) as usize;
         let b = a + 1 + random.below(count - a as u32) as usize;
-        let joined = scene.joints().any(|joint| scene.joined(joint).is_ok_and(|pair| pair == [bodies[a], bodies[b]]));
         let ends = [bodies[a], bodies[b]].map(|b| scene.body(b).expect("living").clone());
         let joint = kind(&mut random, &ends[0], &ends[1], true);
-        // Two joints of one pair may lock what is locked already, and more than a direct solve bears.
-        if !joined {
-            insert(&mut scene, bodies[a], bodies[b], joint);
-        }
+        insert(&mut scene, bodies[a], bodies[b], joint);
     }
     scene
 }
@@ -173,33 +170,42 @@ fn random_joints_stay_finite_and_gain_no_energy() {
             for (how, params) in ways {
                 let one = |seed: u64| watch(&scene(seed, recipe), by, *params, 180);
                 let all: Vec<Watched> = (0..SCENES).into_par_iter().map(one).collect();
-                let q = |of: fn(&Watched) -> f64| {
-                    let mut v: Vec<f64> = all.iter().map(of).collect();
-                    v.sort_by(f64::total_cmp);
-                    format!("{:.4} {:.4} {:.3} {:.3} {:.3}", v[10], v[20], v[30], v[38], v[39])
-                };
-                println!(
-                    "QQ {by:?}{how} {recipe:?}: apart {} gained {} angle {}",
-                    q(|s| s.apart),
-                    q(|s| s.gained),
-                    q(|s| s.angle)
-                );
                 // What is not finite is infinite.
                 let over =
                     |most: f64, of: fn(&Watched) -> f64| all.iter().filter(|seen| of(seen) > most).count() as f64;
-                // Gauss-Seidel lets limits in corners go, and gains by it: told.
-                let ask = |most: f64| if how.is_empty() { Ask::AtMost(most) } else { Ask::Said };
-                for (quantity, value, ask) in [
-                    ("not finite", over(1e30, |seen| seen.apart + seen.gained), Ask::AtMost(0.0)),
-                    ("apart by more than 5 mm", over(5.0, |seen| seen.apart), ask(10.0)),
+                let mut apart: Vec<f64> = all.iter().map(|seen| seen.apart).collect();
+                apart.sort_by(f64::total_cmp);
+                let median = apart[apart.len() / 2];
+                // Gauss-Seidel lets limits in corners go, and gains by it: told. Without geometric stiffness it is off by six
+                // times as much where masses differ, and directly some trees gain.
+                let direct = how.is_empty();
+                let told = |ask: Ask| if direct { ask } else { Ask::Said };
+                let most_gain = if locks || loops > 0 { 3.0 } else { 1.0 };
+                let most_median = match (direct, decades > 0.0) {
+                    (true, false) => 0.4,
+                    (true, true) => 3.0,
+                    (false, false) => 250.0,
+                    (false, true) => 1000.0,
+                };
+                for (quantity, unit, value, ask) in [
+                    ("not finite", "scenes", over(1e30, |seen| seen.apart + seen.gained), Ask::AtMost(0.0)),
+                    ("apart by, median", "mm", median, Ask::AtMost(most_median)),
+                    ("apart by more than 5 mm", "scenes", over(5.0, |seen| seen.apart), told(Ask::AtMost(14.0))),
+                    (
+                        "apart by more than 1 m",
+                        "scenes",
+                        over(1000.0, |seen| seen.apart),
+                        told(Ask::AtMost(if decades > 0.0 { 1.0 } else { 0.0 })),
+                    ),
                     (
                         "gained more than 1 mm of height",
+                        "scenes",
                         over(1.0, |seen| seen.gained),
-                        ask(if decades > 0.0 { 4.0 } else { 0.0 }),
+                        told(Ask::AtMost(if decades > 0.0 { most_gain } else { 0.0 })),
                     ),
                 ] {
                     let quantity = format!("{quantity}{how}");
-                    missed.push(row(&case, by, JOINT_SUBSTEPS, &quantity, "scenes", value, ask));
+                    missed.push(row(&case, by, JOINT_SUBSTEPS, &quantity, unit, value, ask));
                 }
             }
         }

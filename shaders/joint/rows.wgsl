@@ -31,6 +31,8 @@ const MAX_PROJECTION: f32 = 0.5;
 const REGULARIZATION: f32 = 1e-6;
 // The same of joints on cycles, where rows may say the same twice.
 const CYCLE_REGULARIZATION: f32 = 1e-5;
+// The same of those that may lock what is locked already.
+const OVERLOCKED_REGULARIZATION: f32 = 1e-4;
 
 // Up to three rows.
 struct JointRows {
@@ -448,8 +450,10 @@ fn diagonal_block(place: u32, which: u32) -> mat3x3<f32> {
     if is_held(ia) || is_held(ib) {
         k += ghost(place, which);
     }
-    let in_cycle = (joints[joint_works[place].slot].flags & JOINT_IN_CYCLE) != 0u;
-    let more = select(REGULARIZATION, CYCLE_REGULARIZATION, in_cycle) / 3.0 * (k[0].x + k[1].y + k[2].z);
+    let flags = joints[joint_works[place].slot].flags;
+    let in_cycle = select(REGULARIZATION, CYCLE_REGULARIZATION, (flags & JOINT_IN_CYCLE) != 0u);
+    let share = select(in_cycle, OVERLOCKED_REGULARIZATION, (flags & JOINT_OVERLOCKED) != 0u);
+    let more = share / 3.0 * (k[0].x + k[1].y + k[2].z);
     let kinds = joint_works[place].rows[which].kinds;
     let gamma = joint_works[place].rows[which].gamma;
     for (var row = 0u; row < 3u; row++) {

@@ -12,6 +12,7 @@ const JOINT_SOFT: u32 = 8u;
 const JOINT_APART: u32 = 16u;
 const JOINT_HELD: u32 = 32u;
 const JOINT_TWICE: u32 = 64u;
+const JOINT_OVERLOCKED: u32 = 128u;
 const JOINT_FORCE_BASED: u32 = 8u;
 const NO_BODY: u32 = 0xffffffffu;
 

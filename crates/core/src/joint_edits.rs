@@ -70,7 +70,7 @@ impl JointEdits {
             let old = joints[slot as usize];
             let live = scene.joints.at(slot).map(|(generation, _)| JointHandle { slot, generation });
             let mut new = live.and_then(|handle| pack_joint(scene, handle).ok()).unwrap_or(Joint::zeroed());
-            new.flags |= old.flags & (joint_bits::IN_CYCLE | joint_bits::TWICE);
+            new.flags |= old.flags & joint_bits::OF_TOPOLOGY;
             rebuild |= shape(&old) != shape(&new);
             joints[slot as usize] = new;
         }

@@ -61,7 +61,8 @@ pub struct Topology {
 
 impl Topology {
     /// How `joints` (by slot) are solved between bodies of which `moves` can be moved, and `held` are held by the world along
-    /// or about some axes. Marks joints on cycles, and those of which a pair has several.
+    /// or about some axes. Marks joints on cycles, those of which a pair has several, and those
+    /// that may lock what is locked already.
     pub fn new(
         joints: &mut [Joint],
         moves: &impl Fn(u32) -> bool,
@@ -75,7 +76,7 @@ impl Topology {
         for island in islands(joints, &alive, moves) {
             topology.island_count += 1;
             mark_cycles(joints, &island, moves, held);
-            mark_twice(joints, &island, moves);
+            mark_overlocked(joints, &island, moves);
             let direct = match solver {
                 JointSolver::GaussSeidel => None,
                 JointSolver::Auto | JointSolver::Direct => order(joints, &island, moves),
@@ -393,19 +394,25 @@ fn mark_cycles(joints: &mut [Joint], island: &[u32], moves: &impl Fn(u32) -> boo
     }
 }
 
-/// Marks the joints of an island whose bodies have others between them, what does not move being one body.
-fn mark_twice(joints: &mut [Joint], island: &[u32], moves: &impl Fn(u32) -> bool) {
+/// Marks the joints of an island whose bodies have others between them, what does not move being one body, and those on
+/// cycles that may lock what is locked already: all but ball joints, which are each the only one between bodies that the world
+/// does not hold.
+fn mark_overlocked(joints: &mut [Joint], island: &[u32], moves: &impl Fn(u32) -> bool) {
     let node = |body: u32| if moves(body) { body } else { NO_BODY };
-    let mut between: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
+    let pair = |joint: &Joint| {
+        let [a, b] = [joint.body_a, joint.body_b].map(node);
+        [a.min(b), a.max(b)]
+    };
+    let mut counts: BTreeMap<[u32; 2], u32> = BTreeMap::new();
+    island.iter().for_each(|&j| *counts.entry(pair(&joints[j as usize])).or_default() += 1);
     for &j in island {
-        let [a, b] = [joints[j as usize].body_a, joints[j as usize].body_b].map(node);
-        between.entry([a.min(b), a.max(b)]).or_default().push(j);
-    }
-    for all in between.values() {
-        for &j in all {
-            let flags = &mut joints[j as usize].flags;
-            *flags = if all.len() > 1 { *flags | joint_bits::TWICE } else { *flags & !joint_bits::TWICE };
-        }
+        let joint = &mut joints[j as usize];
+        let twice = counts[&pair(joint)] > 1;
+        let held = joint.flags & joint_bits::HELD != 0;
+        let ball = joint.axes == 7 << joint_bits::LOCKED;
+        let overlocked = joint.flags & joint_bits::IN_CYCLE != 0 && (twice || held || !ball);
+        joint.flags &= !(joint_bits::TWICE | joint_bits::OVERLOCKED);
+        joint.flags |= if twice { joint_bits::TWICE } else { 0 } | if overlocked { joint_bits::OVERLOCKED } else { 0 };
     }
 }
 
