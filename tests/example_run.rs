@@ -188,7 +188,7 @@ fn runs_on_an_adapter() {
 
 #[test]
 fn bad_arguments_are_refused_in_one_line() {
-    let cases: [(&[&str], &[&str]); 31] = [
+    let cases: [(&[&str], &[&str]); 33] = [
         (&[], &["no scene", "pile", "pyramid", "hub"]),
         (&["pyramd"], &["'pyramd'", "pile", "balls", "mixed", "column", "hub", "similar", "'pyramid'"]),
         (&["pile", "--bodies", "0"], &["'0'", "--bodies", "1 to 5000000"]),
@@ -207,6 +207,11 @@ fn bad_arguments_are_refused_in_one_line() {
         (&["pile", "--substeps", "257"], &["'257'", "--substeps", "1 to 256"]),
         (&["pile", "--tolerance", "0"], &["accuracy.penetration is 0", "1e-6 to 1 m"]),
         (&["pile", "--tolerance", "NaN"], &["accuracy.penetration is NaN", "1e-6 to 1 m"]),
+        (&["pile", "--joint-tolerance", "NaN"], &["accuracy.joint is NaN", "1e-6 to 1 m"]),
+        (
+            &["pile", "--tolerance", "NaN", "--joint-tolerance", "0.001"],
+            &["accuracy.penetration is NaN", "1e-6 to 1 m"],
+        ),
         (&["pile", "--tolerance", "0.001", "--substeps", "12"], &["accuracy.most is 12", "a multiple of 8"]),
         (&["pile", "--threads", "0"], &["'0'", "--threads", "1 to 1024"]),
         (&["pile", "--backend", "metal"], &["'metal'", "--backend", "auto", "cpu", "gpu"]),

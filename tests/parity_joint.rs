@@ -120,7 +120,8 @@ fn both_sides_solve_joints_alike() {
 }
 
 /// The same where bodies are held along and about axes of the world: in a plane, at a place, without turning, every which
-/// way. Measured (llvmpipe): 1.1e-6 m, 4.8e-6 rad, 3.6e-5 m/s and 2.3e-4 rad/s.
+/// way. Measured (llvmpipe): 8.1e-6 m, 1.7e-5 rad, 2.7e-4 m/s and 1.5e-3 rad/s, by the rod that is to push a body whose place
+/// is locked; the others a tenth of it.
 #[test]
 fn both_sides_solve_joints_of_held_bodies_alike() {
     let scene = kinds(|i, body| match i % 5 {
@@ -132,7 +133,7 @@ fn both_sides_solve_joints_of_held_bodies_alike() {
     });
     for joints in [JointSolver::Direct, JointSolver::GaussSeidel] {
         for count in [1, 5] {
-            let bound = [5e-6, 3e-5, 2e-4, 1e-3];
+            let bound = [3e-5, 1e-4, 1e-3, 6e-3];
             let worst = difference(&scene, joints, count);
             println!("{joints:?} {count} steps, held: {worst:?}");
             assert!(worst.iter().zip(bound).all(|(worst, bound)| *worst <= bound), "{joints:?} {count}: {worst:?}");

@@ -97,6 +97,11 @@ impl Asked {
             BroadphaseName::Lbvh => Broadphase::Lbvh,
             BroadphaseName::SweepAndPrune => Broadphase::SweepAndPrune,
         };
+        if let (None, Some(joint)) = (self.tolerance, self.joint_tolerance) {
+            // Of the two that take its value, the one that was given is named where it is not allowed.
+            let accuracy = Accuracy::Tolerance { penetration: 1e-3, joint, most: 32 };
+            Params { accuracy, ..params }.validate()?;
+        }
         params.validate()?;
         Ok(params)
     }

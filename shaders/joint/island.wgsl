@@ -147,6 +147,14 @@ fn take_terms(start: mat3x3<f32>, first: u32, count: u32) -> mat3x3<f32> {
     return value;
 }
 
+// The inertia of all its bodies with the geometric stiffness of their joints.
+fn stiffen_island(island: JointIsland, lid: u32) {
+    for (var k = island.first_body + lid; k < island.first_body + island.body_count; k += INVOCATIONS) {
+        stiffen(k);
+    }
+    storageBarrier();
+}
+
 // Assembles and factors the system, level by level.
 fn factor(island: JointIsland, lid: u32) {
     for (var level = 0u; level < island.level_count; level++) {
@@ -270,10 +278,7 @@ fn begin(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
         begin_joint(k);
     }
     storageBarrier();
-    for (var k = island.first_body + lid; k < island.first_body + island.body_count; k += INVOCATIONS) {
-        stiffen(k);
-    }
-    storageBarrier();
+    stiffen_island(island, lid);
     for (var k = island.first_joint + lid; k < island.first_joint + island.joint_count; k += INVOCATIONS) {
         refresh(k);
         carry_impulses(k, HALF);
@@ -351,10 +356,7 @@ fn relax(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
         forget_impulses(k);
     }
     storageBarrier();
-    for (var k = island.first_body + lid; k < island.first_body + island.body_count; k += INVOCATIONS) {
-        stiffen(k);
-    }
-    storageBarrier();
+    stiffen_island(island, lid);
     for (var k = island.first_joint + lid; k < island.first_joint + island.joint_count; k += INVOCATIONS) {
         refresh(k);
     }
@@ -387,6 +389,44 @@ fn relax(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
     }
 }
 
+// What lasts of a joint after a step: it breaks where its last sub-step asked for too much; what is not finite does not
+// last. Whether it breaks now.
+fn store_joint(place: u32) -> bool {
+    let slot = joint_works[place].slot;
+    let impulse = joint_states[slot].impulse;
+    let torque = joint_states[slot].torque;
+    if !is_finite3(impulse) || !is_finite3(torque) {
+        joint_states[slot].tag = 0u;
+        joint_states[slot].broken = 0u;
+        return false;
+    }
+    // Where the last projection left it.
+    look(place);
+    // Each level has sub-steps of its own length.
+    let h = joint_states[slot].h;
+    let breaks = sqrt(dot(impulse, impulse)) > joints[slot].break_force * h
+        || sqrt(dot(torque, torque)) > joints[slot].break_torque * h;
+    var separation: vec3<f32>;
+    var angle: vec3<f32>;
+    for (var row = 0u; row < 3u; row++) {
+        if joint_works[place].rows[0].kinds[row] == PIECE_LOCKED {
+            separation[row] = joint_works[place].shift[row] - joints[slot].drives[row].low;
+        }
+        if joint_works[place].rows[1].kinds[row] == PIECE_LOCKED {
+            angle[row] = joint_works[place].turned[row] - joints[slot].drives[3u + row].low;
+        }
+    }
+    joint_states[slot].separation = sqrt(dot(separation, separation));
+    joint_states[slot].angle = sqrt(dot(angle, angle));
+    let breaks_now = breaks && joint_states[slot].broken == 0u;
+    joint_states[slot].broken |= u32(breaks);
+    return breaks_now;
+}
+
+fn is_broken(slot: u32) -> bool {
+    return joint_states[slot].tag == joints[slot].generation + 1u && joint_states[slot].broken != 0u;
+}
+
 // One thread a joint, of all levels.
 @compute @workgroup_size(256)
 fn store(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec3<u32>, @builtin(local_invocation_index) lid: u32) {
@@ -400,17 +440,24 @@ fn store(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
             atomicMax(&counters[CONTROL_NEWLY_BROKEN + slot % BREAK_NAMES], slot + 1u);
         }
     }
-    if joint_states[slot].tag == joints[slot].generation + 1u && joint_states[slot].broken != 0u {
+    if is_broken(slot) {
         atomicAdd(&counters[CONTROL_BROKEN_JOINTS], 1u);
     }
 }
 
-// Marks the bodies that joints move. One thread a body of the topology.
+// Marks the bodies that joints move which are not broken. One thread a body of the topology.
 @compute @workgroup_size(256)
 fn mark(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec3<u32>, @builtin(local_invocation_index) lid: u32) {
     let index = invocation(wg, num, lid);
     if index < joint_layout.body_count && control.stop == 0u {
         let info = joint_body(index);
-        solver_bodies[info.body].touched |= select(TOUCHED_CONTACT, TOUCHED_JOINED, info.direct != 0u);
+        var is_joined = false;
+        for (var k = 0u; k < info.end_count; k++) {
+            let place = joint_tables[joint_layout.ends + info.first_end + k] >> 1u;
+            is_joined |= !is_broken(joint_tables[joint_layout.joints + place]);
+        }
+        if is_joined {
+            solver_bodies[info.body].touched |= select(TOUCHED_CONTACT, TOUCHED_JOINED, info.direct != 0u);
+        }
     }
 }

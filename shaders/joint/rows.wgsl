@@ -96,6 +96,25 @@ fn see(slot: u32) -> Seen {
     );
 }
 
+// 1/kg along the world's axes; zero along those that are locked.
+fn inverse_masses(slot: u32) -> vec3<f32> {
+    return along_free(solver_bodies[slot].touched, vec3<f32>(solver_bodies[slot].inverse_mass));
+}
+
+// Whether the body moves, and is held along or about an axis of the world.
+fn is_held(slot: u32) -> bool {
+    let turns = solver_bodies[slot].inverse_inertia_diagonal;
+    return solver_bodies[slot].inverse_mass > 0.0 && (is_locked(solver_bodies[slot].touched) || any(turns == vec3<f32>()));
+}
+
+// What a body answers a row with: a push along `along`, a turn about `turn` and the response to that.
+fn own_answer(slot: u32, along: vec3<f32>, turn: vec3<f32>, response: vec3<f32>) -> f32 {
+    let own = dot(along, inverse_masses(slot) * along) + dot(turn, response);
+    let turns = dot(solver_bodies[slot].inverse_inertia_diagonal, vec3<f32>(1.0));
+    let most = select(solver_bodies[slot].inverse_mass, turns, all(along == vec3<f32>()));
+    return select(own, answer(own, most), is_held(slot));
+}
+
 fn turn_response(slot: u32, v: vec3<f32>) -> vec3<f32> {
     return symmetric_times(solver_bodies[slot].inverse_inertia_diagonal, solver_bodies[slot].inverse_inertia_off, v);
 }
@@ -447,8 +466,12 @@ fn diagonal_block(place: u32, which: u32) -> mat3x3<f32> {
     var k = transpose(along) * scaled(inverse_masses(ia) + inverse_masses(ib), along)
         + transpose(joint_works[place].rows[which].turn_a) * joint_works[place].rows[which].response_a
         + transpose(joint_works[place].rows[which].turn_b) * joint_works[place].rows[which].response_b;
-    if is_held(ia) || is_held(ib) {
-        k += ghost(place, which);
+    if which == 0u && (is_held(ia) || is_held(ib)) {
+        let both = solver_bodies[ia].inverse_mass + solver_bodies[ib].inverse_mass;
+        k += ghost(along, inverse_masses(ia) + inverse_masses(ib), both);
+    } else if is_held(ia) || is_held(ib) {
+        let turns = solver_bodies[ia].inverse_inertia_diagonal + solver_bodies[ib].inverse_inertia_diagonal;
+        k += ghost(joint_works[place].rows[which].turn_b, turns, turns.x + turns.y + turns.z);
     }
     let flags = joints[joint_works[place].slot].flags;
     let in_cycle = select(REGULARIZATION, CYCLE_REGULARIZATION, (flags & JOINT_IN_CYCLE) != 0u);
@@ -460,38 +483,4 @@ fn diagonal_block(place: u32, which: u32) -> mat3x3<f32> {
         k[row][row] += select(gamma[row] + more, 1.0, kinds[row] == PIECE_FIXED);
     }
     return k;
-}
-
-// What lasts of a joint after a step: it breaks where its last sub-step asked for too much; what is not finite does not
-// last. Whether it breaks now.
-fn store_joint(place: u32) -> bool {
-    let slot = joint_works[place].slot;
-    let impulse = joint_states[slot].impulse;
-    let torque = joint_states[slot].torque;
-    if !is_finite3(impulse) || !is_finite3(torque) {
-        joint_states[slot].tag = 0u;
-        joint_states[slot].broken = 0u;
-        return false;
-    }
-    // Where the last projection left it.
-    look(place);
-    // Each level has sub-steps of its own length.
-    let h = joint_states[slot].h;
-    let breaks = sqrt(dot(impulse, impulse)) > joints[slot].break_force * h
-        || sqrt(dot(torque, torque)) > joints[slot].break_torque * h;
-    var separation: vec3<f32>;
-    var angle: vec3<f32>;
-    for (var row = 0u; row < 3u; row++) {
-        if joint_works[place].rows[0].kinds[row] == PIECE_LOCKED {
-            separation[row] = joint_works[place].shift[row] - joints[slot].drives[row].low;
-        }
-        if joint_works[place].rows[1].kinds[row] == PIECE_LOCKED {
-            angle[row] = joint_works[place].turned[row] - joints[slot].drives[3u + row].low;
-        }
-    }
-    joint_states[slot].separation = sqrt(dot(separation, separation));
-    joint_states[slot].angle = sqrt(dot(angle, angle));
-    let breaks_now = breaks && joint_states[slot].broken == 0u;
-    joint_states[slot].broken |= u32(breaks);
-    return breaks_now;
 }

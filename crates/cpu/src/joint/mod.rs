@@ -282,11 +282,19 @@ impl Running<'_> {
     }
 }
 
-/// Marks the bodies that joints move: see [`SolverBody::touched`].
-pub fn mark(set: &JointSet, bodies: &mut [SolverBody]) {
-    for body in &set.topology.bodies {
-        let bit = if body.direct != 0 { touched::JOINED } else { touched::CONTACT };
-        bodies[body.body as usize].touched |= bit;
+/// Marks the bodies that joints move which are not broken: see [`SolverBody::touched`]. `states` is what lasts of the joints,
+/// by slot; those that have none are whole.
+pub fn mark(set: &JointSet, states: &[JointState], bodies: &mut [SolverBody]) {
+    let topology = &set.topology;
+    let is_whole = |&end: &u32| {
+        let slot = topology.joints[end as usize / 2] as usize;
+        !states.get(slot).is_some_and(|state| is_broken(&set.joints[slot], state))
+    };
+    for body in &topology.bodies {
+        let ends = &topology.ends[body.first_end as usize..][..body.end_count as usize];
+        if ends.iter().any(is_whole) {
+            bodies[body.body as usize].touched |= if body.direct != 0 { touched::JOINED } else { touched::CONTACT };
+        }
     }
 }
 

@@ -242,7 +242,7 @@ impl Kept {
             .with_min_len(256)
             .map(|i| prepare::prepare_body(&states[i], &self.props[i], batches.masks[i], step))
             .collect();
-        joint::mark(&joints, &mut bodies);
+        joint::mark(&joints, &self.joints.states, &mut bodies);
         if step.batching & batching::SPLIT_LAST != 0 {
             let last = &batches.order[batches.start[LAST_BATCH as usize] as usize..];
             let ends = last.iter().map(|&pair| bodies_of(&matched.pairs[pair as usize], &self.colliders));
