@@ -263,7 +263,10 @@ fn what_nothing_can_move_moves_nothing() {
         let mut scene = Scene::new();
         let mut at = Vec3::ZERO;
         let mut all = Vec::new();
+        // A motor along an axis that is all but square to the plane.
+        let lift = Vec3::new(1e-3, 0.0, 1.0);
         let kinds = [
+            JointBuilder::generic(&[]).local_axis1(lift).local_axis2(lift).motor_velocity(JointAxis::LinX, 1.0, 1000.0),
             JointBuilder::fixed(),
             turned(JointBuilder::fixed(), tilt),
             JointBuilder::spherical(),
