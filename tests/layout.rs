@@ -163,7 +163,8 @@ fn rust_constants() -> Vec<(&'static str, &'static str, u32)> {
         locks as "LOCKED_" { TRANSLATIONS, ROTATIONS, FIRST_ROTATION }
         touched as "TOUCHED_" { CONTACT, JOINED, ANY, FIRST_LOCK }
         joint_bits as "JOINT_" {
-            LOCKED, DRIVEN, LIMITED, MOTOR, ALIVE, COUPLED, IN_CYCLE, SOFT, APART, FORCE_BASED
+            LOCKED, DRIVEN, LIMITED, MOTOR, ALIVE, COUPLED, IN_CYCLE, SOFT, APART, HELD, TWICE, OVERLOCKED,
+            FORCE_BASED
         }
         solver as "SOLVER_" { ONE_PASS, SOFT, GAUSS_SEIDEL, JACOBI, PENALTY }
         shape_kind as "SHAPE_" { NONE, BALL, CUBOID, HALFSPACE }

@@ -11,6 +11,9 @@ use bytemuck::Zeroable;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+/// Flags of joints that the topology gives them.
+const OF_TOPOLOGY: u32 = joint_bits::IN_CYCLE | joint_bits::TWICE | joint_bits::OVERLOCKED;
+
 /// The joints of a step. Equal pointers mean equal joints.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct JointSet {
@@ -70,7 +73,7 @@ impl JointEdits {
             let old = joints[slot as usize];
             let live = scene.joints.at(slot).map(|(generation, _)| JointHandle { slot, generation });
             let mut new = live.and_then(|handle| pack_joint(scene, handle).ok()).unwrap_or(Joint::zeroed());
-            new.flags |= old.flags & joint_bits::OF_TOPOLOGY;
+            new.flags |= old.flags & OF_TOPOLOGY;
             rebuild |= shape(&old) != shape(&new);
             joints[slot as usize] = new;
         }

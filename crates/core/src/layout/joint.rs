@@ -26,8 +26,6 @@ pub mod joint_bits {
     pub const TWICE: u32 = 64;
     /// Flag: it lies on a cycle and may lock what others of it, or the world, lock already: it is more than a ball joint.
     pub const OVERLOCKED: u32 = 128;
-    /// Flags that come from the topology.
-    pub const OF_TOPOLOGY: u32 = IN_CYCLE | TWICE | OVERLOCKED;
     /// Flag: the motor of axis k is force based: bit k + 8.
     pub const FORCE_BASED: u32 = 8;
 }
