@@ -16,6 +16,10 @@ pub(crate) struct Shared<'a, T> {
 unsafe impl<T: Copy + Send> Sync for Shared<'_, T> {}
 
 impl<T: Copy> Shared<'_, T> {
+    pub(crate) fn len(&self) -> usize {
+        self.len
+    }
+
     /// Elements `range`, for this thread alone.
     ///
     /// # Safety

@@ -193,7 +193,7 @@ pub(crate) const START: usize = 6;
 
 /// Row `r` of each body, as its four numbers of all bodies.
 #[inline(always)]
-fn columns<L: Lanes>(read: &impl Fn(usize) -> f32x4, index: L::Indices, r: usize) -> [L; 4] {
+pub(crate) fn columns<L: Lanes>(read: &impl Fn(usize) -> f32x4, index: L::Indices, r: usize) -> [L; 4] {
     let mut rows = L::Rows::default();
     for (row, &i) in rows.as_mut().iter_mut().zip(index.as_ref()) {
         if i != NO_BODY {
@@ -201,6 +201,27 @@ fn columns<L: Lanes>(read: &impl Fn(usize) -> f32x4, index: L::Indices, r: usize
         }
     }
     L::columns(rows)
+}
+
+/// Row `r` of those bodies whose `inverse_mass` is not zero.
+///
+/// # Safety
+/// No other thread touches any of those bodies meanwhile.
+#[inline(always)]
+pub(crate) unsafe fn set_columns<L: Lanes>(
+    bodies: &Shared<'_, f32x4>,
+    index: L::Indices,
+    r: usize,
+    columns: [L; 4],
+    inverse_mass: L,
+) {
+    let rows = L::rows(columns);
+    for (lane, &body) in index.as_ref().iter().enumerate() {
+        if inverse_mass.as_array()[lane] > 0.0 {
+            // SAFETY: the caller's promise.
+            unsafe { bodies.set(ROWS * body as usize + r, rows.as_ref()[lane]) };
+        }
+    }
 }
 
 /// Bodies of which any of these translations (`locks`) is locked.

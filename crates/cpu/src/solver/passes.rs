@@ -18,8 +18,6 @@ use wide::f32x4;
 
 /// Fewest groups of a block.
 const GROUPS: usize = 8;
-/// Fewest joints of a block.
-const JOINTS: usize = 64;
 /// Fewest bodies of a block.
 const BODIES: usize = 128;
 
@@ -71,11 +69,9 @@ pub(super) fn run(
             Pass::Bodies(_) => stages.push((pass, None, all.clone(), blocks(all.len(), BODIES))),
             Pass::Sweep(_) => stages.extend(parts.iter().map(|p| (pass, Some(p), p.groups.clone(), p.blocks))),
             Pass::Joints(part) => {
-                let ranges = joints.map_or(Vec::new(), |joints| joints.stages(part));
-                stages.extend(ranges.into_iter().filter(|range| !range.is_empty()).map(|range| {
-                    let least = if part.is_of_islands() { 1 } else { JOINTS };
-                    (pass, None, range.clone(), blocks(range.len(), least))
-                }));
+                let all = joints.map_or(Vec::new(), |joints| joints.stages(part));
+                let some = all.into_iter().filter(|(range, _)| !range.is_empty());
+                stages.extend(some.map(|(range, blocks)| (pass, None, range, blocks)));
             }
         }
     }
