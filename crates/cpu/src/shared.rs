@@ -45,6 +45,29 @@ impl<'a, T: Copy> Shared<'a, T> {
         Self { start: slice.as_mut_ptr(), len: slice.len(), lifetime: PhantomData }
     }
 
+    /// Elements `N * index` to `N * index + N - 1`.
+    ///
+    /// # Safety
+    /// No thread writes any of them while the reference lives.
+    #[inline(always)]
+    pub(crate) unsafe fn chunk<const N: usize>(&self, index: usize) -> &[T; N] {
+        assert!(index < self.len / N);
+        // SAFETY: in bounds by the assertion; nobody writes it meanwhile, by the caller's promise.
+        unsafe { &*self.start.add(N * index).cast() }
+    }
+
+    /// The same, for this thread alone.
+    ///
+    /// # Safety
+    /// As for [`Shared::slice_mut`].
+    #[expect(clippy::mut_from_ref, reason = "callers keep the chunks apart")]
+    #[inline(always)]
+    pub(crate) unsafe fn chunk_mut<const N: usize>(&self, index: usize) -> &mut [T; N] {
+        assert!(index < self.len / N);
+        // SAFETY: in bounds by the assertion; nobody else touches it meanwhile, by the caller's promise.
+        unsafe { &mut *self.start.add(N * index).cast() }
+    }
+
     /// Reads one element.
     ///
     /// # Safety

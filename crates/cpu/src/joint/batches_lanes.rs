@@ -157,13 +157,7 @@ impl<L: Lanes> JointLanes<L> {
     }
 
     #[inline(always)]
-    fn start(
-        &mut self,
-        made: &MadeLanes<L>,
-        rotations: [[L; 4]; 2],
-        torque: V3<L>,
-        turns: Option<&mut TurnLanes<L>>,
-    ) {
+    fn start(&mut self, made: &MadeLanes<L>, rotations: [[L; 4]; 2], torque: V3<L>, turns: Option<&mut TurnLanes<L>>) {
         for k in 0..2 {
             self.starts[k] = rotate(rotations[k], made.anchors[k]);
         }

@@ -3,7 +3,7 @@
 use super::lanes::{Symmetric, axes, choose, normalized, product, rotate};
 use super::rows::STIFFENING;
 use crate::shared::Shared;
-use crate::solver::lanes::{NO_BODY, START, columns, set_columns};
+use crate::solver::lanes::{BodyRows, NO_BODY, Places, START};
 use crate::solver::simd::{Lanes, V3};
 use tumble_core::layout::{BodyProps, BodyState, Joint, StepParams};
 use wide::f32x4;
@@ -51,7 +51,7 @@ impl<L: Lanes> BodyGroup<L> {
         step: &StepParams,
     ) {
         // SAFETY: the caller's promise.
-        let read = |i: usize| unsafe { bodies.get(i) };
+        let places = Places::new::<L>(|i| unsafe { bodies.chunk(i) }, self.slots);
         let (mut rotations, mut inverses, mut moments) = (L::Rows::default(), L::Rows::default(), L::Rows::default());
         for (lane, &slot) in self.slots.as_ref().iter().enumerate().filter(|(_, slot)| **slot != NO_BODY) {
             let (state, props) = (&states[slot as usize], &props[slot as usize]);
@@ -61,7 +61,7 @@ impl<L: Lanes> BodyGroup<L> {
             let [x, y, z] = props.inertia;
             moments.as_mut()[lane] = f32x4::new([x, y, z, 0.0]);
         }
-        let rotation = normalized(product(columns(&read, self.slots, 3), L::columns(rotations)));
+        let rotation = normalized(product(places.columns(3), L::columns(rotations)));
         let more = self.stiffening(ends, rotation, impulses, step);
         let axes = axes(rotation);
         let ([ix, iy, iz, is_free], [mx, my, mz, _]) = (L::columns(inverses), L::columns(moments));
@@ -75,16 +75,12 @@ impl<L: Lanes> BodyGroup<L> {
         if (!stiff).any() {
             inverse = inverse.where_set(stiff, Symmetric::of_axes(axes, V3::new(ix, iy, iz)));
         }
-        let [_, _, _, inverse_mass]: [L; 4] = columns(&read, self.slots, 0);
-        let [wx, wy, wz, _]: [L; 4] = columns(&read, self.slots, 1);
-        let [dx, dy, dz, level]: [L; 4] = columns(&read, self.slots, 4);
-        let [ox, oy, oz, parts]: [L; 4] = columns(&read, self.slots, 5);
-        let [sx, sy, sz, weighted]: [L; 4] = columns(&read, self.slots, START + 1);
-        let mut of_level = L::ZERO;
-        for (lane, level) in level.as_array().iter().enumerate() {
-            of_level.as_mut_array()[lane] = f32::from(u8::from(level.to_bits() == step.level));
-        }
-        let mine = of_level * is_free * inverse_mass;
+        let [_, _, _, inverse_mass]: [L; 4] = places.columns(0);
+        let [wx, wy, wz, _]: [L; 4] = places.columns(1);
+        let [dx, dy, dz, level]: [L; 4] = places.columns(4);
+        let [ox, oy, oz, parts]: [L; 4] = places.columns(5);
+        let [sx, sy, sz, weighted]: [L; 4] = places.columns(START + 1);
+        let mine = is_free * inverse_mass;
         // What contacts will add again goes with the new inertia.
         let (angular, start) = (V3::new(wx, wy, wz), V3::new(sx, sy, sz));
         let carried = angular - start;
@@ -92,12 +88,17 @@ impl<L: Lanes> BodyGroup<L> {
         let (torque, has_one) = before.solve(carried);
         let start = choose(has_one, angular - inverse.times(torque), start);
         let Symmetric { diagonal: d, off: o } = inverse;
-        // SAFETY: the caller's promise.
-        unsafe { set_columns(bodies, self.slots, 4, [d.x, d.y, d.z, level], mine) };
-        // SAFETY: the caller's promise.
-        unsafe { set_columns(bodies, self.slots, 5, [o.x, o.y, o.z, parts], mine) };
-        // SAFETY: the caller's promise.
-        unsafe { set_columns(bodies, self.slots, START + 1, [start.x, start.y, start.z, weighted], mine) };
+        let (diagonal, off) = (L::rows([d.x, d.y, d.z, level]), L::rows([o.x, o.y, o.z, parts]));
+        let start = L::rows([start.x, start.y, start.z, weighted]);
+        for (lane, &slot) in self.slots.as_ref().iter().enumerate() {
+            let is_of_level = level.as_array()[lane].to_bits() == step.level;
+            if is_of_level && mine.as_array()[lane] > 0.0 {
+                // SAFETY: the caller's promise.
+                let rows: &mut BodyRows = unsafe { bodies.chunk_mut(slot as usize) };
+                (rows[4], rows[5], rows[START + 1]) =
+                    (diagonal.as_ref()[lane], off.as_ref()[lane], start.as_ref()[lane]);
+            }
+        }
     }
 
     #[inline(always)]

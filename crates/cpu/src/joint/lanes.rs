@@ -1,7 +1,7 @@
 //! Words of the files called `_lanes`: symmetric matrices, rotations, and bodies between two joints, several at a time.
 
 use crate::shared::Shared;
-use crate::solver::lanes::{BodyLanes, START, columns, set_columns};
+use crate::solver::lanes::BodyLanes;
 use crate::solver::simd::{Lanes, V3};
 use wide::f32x4;
 
@@ -141,7 +141,7 @@ impl<L: Lanes> Held<L> {
     #[inline(always)]
     pub(super) unsafe fn gather(bodies: &Shared<'_, f32x4>, index: L::Indices, moved: bool) -> Self {
         // SAFETY: the caller's promise.
-        let body = BodyLanes::gather(|i| unsafe { bodies.get(i) }, index, moved);
+        let body = BodyLanes::gather(|i| unsafe { bodies.chunk(i) }, index, moved);
         let mass = body.inverse_mass;
         let inverse_masses = body.along_free(V3::new(mass, mass, mass));
         Self { index, body, before: [body.linear, body.angular], inverse_masses }
@@ -189,16 +189,7 @@ impl<L: Lanes> Held<L> {
     /// No other thread touches any of those bodies that can be pushed meanwhile.
     #[inline(always)]
     pub(super) unsafe fn put(self, bodies: &Shared<'_, f32x4>) {
-        let changes = [self.body.linear - self.before[0], self.body.angular - self.before[1]];
-        let mass = self.body.inverse_mass;
-        for (k, change) in changes.iter().enumerate() {
-            // SAFETY: the caller's promise.
-            let [x, y, z, w] = columns(&|i| unsafe { bodies.get(i) }, self.index, START + k);
-            let start = [x + change.x, y + change.y, z + change.z, w];
-            // SAFETY: the caller's promise.
-            unsafe { set_columns(bodies, self.index, START + k, start, mass) };
-        }
         // SAFETY: the caller's promise.
-        unsafe { self.body.scatter(bodies, self.index) };
+        unsafe { self.body.scatter_with_start(bodies, self.index, self.before) };
     }
 }

@@ -1,12 +1,12 @@
 //! The joints of batches within a step: in lanes where they are alike (`batches_lanes`), one by one where limits, motors,
 //! springs or free axes make them differ (`batches`), by all threads.
 
+use super::Part;
 use super::batches::{Loose, stiffen};
 use super::batches_lanes::{is_plain_lock, locks_angles};
 use super::groups::{Groups, Seen, SharedGroups};
 use super::island::{Scene, Store};
 use super::rows::{Body, breaks};
-use super::Part;
 use crate::bounds::moves;
 use crate::shared::Shared;
 use crate::workers::blocks;
@@ -95,8 +95,7 @@ impl LooseJoints {
         for batch in topology.batches.windows(2) {
             let places = batch[0] as usize..batch[1] as usize;
             let joint = |place: &usize| &set.joints[topology.joints[*place] as usize];
-            let (alike, others): (Vec<_>, Vec<_>) =
-                places.partition(|place| lanes > 1 && is_plain_lock(joint(place)));
+            let (alike, others): (Vec<_>, Vec<_>) = places.partition(|place| lanes > 1 && is_plain_lock(joint(place)));
             let (fixed, balls): (Vec<_>, Vec<_>) = alike.into_iter().partition(|place| locks_angles(joint(place)));
             for places in balls.chunks(lanes).chain(fixed.chunks(lanes)) {
                 let group = self.units.iter().filter(|unit| matches!(unit, Unit::Lanes(_))).count();
@@ -198,7 +197,9 @@ impl RunningLoose<'_> {
             match (units[0], units[units.len() - 1]) {
                 // SAFETY: a group is in one block of one stage, and batches share no body that moves.
                 (Unit::Lanes(first), Unit::Lanes(last)) => unsafe { self.groups.visit(part, first..last + 1, &seen) },
-                (Unit::Singles(first, end), _) => (first..end).for_each(|single| self.visit_single(part, single, &seen)),
+                (Unit::Singles(first, end), _) => {
+                    (first..end).for_each(|single| self.visit_single(part, single, &seen))
+                }
                 _ => unreachable!("units of a chunk are alike"),
             }
         }

@@ -17,10 +17,8 @@ pub(super) fn rotation_vector<L: Lanes>(qa: [L; 4], qb: [L; 4]) -> ([V3<L>; 3], 
     let ratio = small.bitselect(L::splat(2.0) + sine * sine * L::splat(1.0 / 3.0), L::splat(2.0) * half / sine);
     let turn = ratio * imaginary;
     let square = turn.dot(turn);
-    let share = small.bitselect(
-        L::splat(1.0 / 12.0) + square * L::splat(1.0 / 720.0),
-        (L::ONE - half * w / sine) / square,
-    );
+    let share =
+        small.bitselect(L::splat(1.0 / 12.0) + square * L::splat(1.0 / 720.0), (L::ONE - half * w / sine) / square);
     let (zero, one) = (L::ZERO, L::ONE);
     let x = column(qa, turn, share, V3::new(one, zero, zero));
     let y = column(qa, turn, share, V3::new(zero, one, zero));

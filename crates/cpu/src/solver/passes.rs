@@ -152,9 +152,11 @@ fn visit_group<L: Lanes>(visit: Visit, group: &mut ConstraintLanes<L>, bodies: &
     // SAFETY: no other thread moves these bodies meanwhile: constraints of one batch share none that moves, a part of
     // several batches is one block, and bodies that do not move are never written (`scatter`).
     let read = |i: usize| unsafe { bodies.get(i) };
+    // SAFETY: as above.
+    let body = |i: usize| unsafe { bodies.chunk(i) };
     let (ia, ib) = (group.head.body_a, group.head.body_b);
-    let mut a = BodyLanes::gather(read, ia, moved);
-    let mut b = BodyLanes::gather(read, ib, moved);
+    let mut a = BodyLanes::gather(body, ia, moved);
+    let mut b = BodyLanes::gather(body, ib, moved);
     match visit {
         Visit::WarmStart => group.warm_start(&mut a, &mut b),
         Visit::Solve | Visit::Relax => soft_lanes::visit(visit, group, &mut a, &mut b, step),
