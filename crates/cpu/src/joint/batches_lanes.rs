@@ -158,20 +158,17 @@ impl<L: Lanes> JointLanes<L> {
 
     #[inline(always)]
     fn start(&mut self, made: &MadeLanes<L>, rotations: [[L; 4]; 2], torque: V3<L>, turns: Option<&mut TurnLanes<L>>) {
-        for k in 0..2 {
-            self.starts[k] = rotate(rotations[k], made.anchors[k]);
-        }
+        let ([a, b], [to_a, to_b]) = (rotations, made.anchors);
+        self.starts = [rotate(a, to_a), rotate(b, to_b)];
         if let Some(turns) = turns {
-            for k in 0..2 {
-                turns.starts[k] = product(rotations[k], made.frames[k]);
-            }
-            let [qa, qb] = turns.starts;
+            let [qa, qb] = [product(a, made.frames[0]), product(b, made.frames[1])];
+            turns.starts = [qa, qb];
             turns.axes = rotation_vector(qa, qb).0;
             turns.about.impulse = transposed_times(turns.axes, torque);
         }
     }
 
-    /// Arms, axes, goals and masses with the poses as they are now.
+    /// Arms, axes, goals and masses with the poses as they are now. Impulses as [`JointLanes::relax`].
     ///
     /// # Safety
     /// No other thread writes these joints' bodies meanwhile.
@@ -181,10 +178,11 @@ impl<L: Lanes> JointLanes<L> {
         turns: Option<&mut TurnLanes<L>>,
         bodies: &Shared<'_, f32x4>,
         step: &StepParams,
-    ) {
+    ) -> L::Rows {
         // SAFETY: the caller's promise.
         let [a, b] = unsafe { Held::gather_both(bodies, self.bodies, true) };
         self.rebuild(turns, &a, &b, step);
+        self.impulses()
     }
 
     #[inline(always)]
@@ -266,7 +264,7 @@ impl<L: Lanes> JointLanes<L> {
 
     /// The impulses along of the last sub-step, in the world, as four numbers of each.
     #[inline(always)]
-    pub(super) fn impulses(&self) -> L::Rows {
+    fn impulses(&self) -> L::Rows {
         let V3 { x, y, z } = self.along.impulse;
         L::rows([x, y, z, L::ZERO])
     }

@@ -18,8 +18,6 @@ use wide::f32x4;
 /// Joints and bodies in lanes.
 #[derive(Debug)]
 pub(super) enum Groups {
-    /// All are visited one by one.
-    None,
     Four(Lots<f32x4>),
     /// Only where the processor has AVX2.
     #[cfg(target_arch = "x86_64")]
@@ -28,7 +26,6 @@ pub(super) enum Groups {
 
 /// The same, for threads that write different ones.
 pub(super) enum SharedGroups<'a> {
-    None,
     Four(SharedLots<'a, f32x4>),
     #[cfg(target_arch = "x86_64")]
     Eight(SharedLots<'a, F32x8>),
@@ -78,7 +75,6 @@ impl Groups {
     /// None if the processor does not take so many at once.
     pub(super) fn with_lanes(lanes: usize) -> Option<Self> {
         match lanes {
-            1 => Some(Self::None),
             4 => Some(Self::Four(Lots::default())),
             #[cfg(target_arch = "x86_64")]
             8 if avx2::is_there() => Some(Self::Eight(Lots::default())),
@@ -86,10 +82,9 @@ impl Groups {
         }
     }
 
-    /// Joints in a group.
+    /// Joints of a group.
     pub(super) fn lanes(&self) -> usize {
         match self {
-            Self::None => 1,
             Self::Four(_) => f32x4::COUNT,
             #[cfg(target_arch = "x86_64")]
             Self::Eight(_) => F32x8::COUNT,
@@ -98,7 +93,6 @@ impl Groups {
 
     pub(super) fn clear(&mut self) {
         match self {
-            Self::None => {}
             Self::Four(lots) => *lots = Lots::default(),
             #[cfg(target_arch = "x86_64")]
             Self::Eight(lots) => *lots = Lots::default(),
@@ -108,7 +102,6 @@ impl Groups {
     /// Takes up to as many joints as there are lanes, by slot, all with rows about or all without.
     pub(super) fn push_joints(&mut self, set: &JointSet, slots: &[u32]) {
         match self {
-            Self::None => {}
             Self::Four(lots) => lots.push_joints(set, slots),
             #[cfg(target_arch = "x86_64")]
             Self::Eight(lots) => lots.push_joints(set, slots),
@@ -118,7 +111,6 @@ impl Groups {
     /// Takes the bodies of the joints of batches, whose impulses lie at `seats`, by place.
     pub(super) fn push_bodies(&mut self, set: &JointSet, seats: &[u32]) {
         match self {
-            Self::None => {}
             Self::Four(lots) => lots.push_bodies(set, seats),
             #[cfg(target_arch = "x86_64")]
             Self::Eight(lots) => lots.push_bodies(set, seats),
@@ -128,7 +120,6 @@ impl Groups {
     /// For the threads of one parallel pass.
     pub(super) fn shared(&mut self) -> SharedGroups<'_> {
         match self {
-            Self::None => SharedGroups::None,
             Self::Four(lots) => SharedGroups::Four(lots.shared()),
             #[cfg(target_arch = "x86_64")]
             Self::Eight(lots) => SharedGroups::Eight(lots.shared()),
@@ -145,7 +136,6 @@ impl Groups {
         keep: &(impl Fn(u32, JointState) + Sync),
     ) {
         match self {
-            Self::None => {}
             Self::Four(lots) => lots.for_each_lasting(before, states, bodies, step, keep),
             #[cfg(target_arch = "x86_64")]
             Self::Eight(lots) => lots.for_each_lasting(before, states, bodies, step, keep),
@@ -160,7 +150,6 @@ impl SharedGroups<'_> {
     /// No other thread touches these groups meanwhile, nor what moves of their bodies.
     pub(super) unsafe fn visit(&self, part: Part, groups: Range<usize>, seen: &Seen<'_>) {
         match self {
-            Self::None => {}
             // SAFETY: the caller's promise.
             Self::Four(lots) => unsafe { lots.visit(part, groups, seen) },
             #[cfg(target_arch = "x86_64")]
@@ -172,7 +161,6 @@ impl SharedGroups<'_> {
     /// Groups of bodies.
     pub(super) fn body_groups(&self) -> usize {
         match self {
-            Self::None => 0,
             Self::Four(lots) => lots.bodies.len(),
             #[cfg(target_arch = "x86_64")]
             Self::Eight(lots) => lots.bodies.len(),
@@ -185,7 +173,6 @@ impl SharedGroups<'_> {
     /// No other thread touches these bodies meanwhile, nor writes impulses.
     pub(super) unsafe fn stiffen(&self, groups: Range<usize>, seen: &Seen<'_>) {
         match self {
-            Self::None => {}
             // SAFETY: the caller's promise.
             Self::Four(lots) => unsafe { lots.stiffen(groups, seen) },
             #[cfg(target_arch = "x86_64")]
@@ -272,9 +259,9 @@ impl<L: Lanes> SharedLots<'_, L> {
         let (bodies, step) = (seen.bodies.rows(), seen.step);
         // SAFETY: the caller's promise.
         let joints = unsafe { self.joints.slice_mut(groups.clone()) };
-        // SAFETY: the caller's promise, as each group has turns of its own.
         let turns = |group: usize| {
             let place = self.turns_of[group]? as usize;
+            // SAFETY: the caller's promise, as each group has turns of its own.
             Some(unsafe { &mut self.turns.slice_mut(place..place + 1)[0] })
         };
         if part == Part::BeginLoose {
@@ -294,15 +281,16 @@ impl<L: Lanes> SharedLots<'_, L> {
             #[inline(always)]
             || {
                 for (group, joints) in groups.zip(joints) {
-                    // SAFETY: the caller's promise.
+                    let turns = turns(group);
                     match part {
-                        Part::WarmStartLoose => unsafe { joints.warm_start(turns(group), &bodies) },
-                        Part::SolveLoose => unsafe { joints.solve(turns(group), &bodies) },
-                        Part::BeginLoose => {
-                            unsafe { joints.refresh(turns(group), &bodies, step) };
-                            keep(group, joints.impulses());
-                        }
-                        _ => keep(group, unsafe { joints.relax(turns(group), &bodies, step) }),
+                        // SAFETY: the caller's promise.
+                        Part::WarmStartLoose => unsafe { joints.warm_start(turns, &bodies) },
+                        // SAFETY: the caller's promise.
+                        Part::SolveLoose => unsafe { joints.solve(turns, &bodies) },
+                        // SAFETY: the caller's promise.
+                        Part::BeginLoose => keep(group, unsafe { joints.refresh(turns, &bodies, step) }),
+                        // SAFETY: the caller's promise.
+                        _ => keep(group, unsafe { joints.relax(turns, &bodies, step) }),
                     }
                 }
             },

@@ -49,6 +49,8 @@ struct Single {
 pub(super) struct LooseJoints {
     /// What all this is made from.
     built: Option<Arc<JointSet>>,
+    /// Whether no joint goes into a group.
+    one_by_one: bool,
     groups: Groups,
     singles: Vec<Single>,
     /// Batch by batch.
@@ -64,7 +66,7 @@ pub(super) struct LooseJoints {
 /// The same in a step.
 pub(super) struct RunningLoose<'a> {
     groups: SharedGroups<'a>,
-    /// Joints of a group.
+    /// Bodies whose inertia is made together.
     lanes: usize,
     singles: Shared<'a, Single>,
     units: &'a [Unit],
@@ -74,8 +76,11 @@ pub(super) struct RunningLoose<'a> {
 }
 
 impl LooseJoints {
-    /// So many side by side at most; none if the processor does not take that many.
+    /// So many side by side, or all one by one; none if the processor does not take that many.
     pub(super) fn with_lanes(lanes: usize) -> Option<Self> {
+        if lanes == 1 {
+            return Some(Self { one_by_one: true, ..Self::default() });
+        }
         Some(Self { groups: Groups::with_lanes(lanes)?, ..Self::default() })
     }
 
@@ -95,7 +100,8 @@ impl LooseJoints {
         for batch in topology.batches.windows(2) {
             let places = batch[0] as usize..batch[1] as usize;
             let joint = |place: &usize| &set.joints[topology.joints[*place] as usize];
-            let (alike, others): (Vec<_>, Vec<_>) = places.partition(|place| lanes > 1 && is_plain_lock(joint(place)));
+            let (alike, others): (Vec<_>, Vec<_>) =
+                places.partition(|place| !self.one_by_one && is_plain_lock(joint(place)));
             let (fixed, balls): (Vec<_>, Vec<_>) = alike.into_iter().partition(|place| locks_angles(joint(place)));
             for places in balls.chunks(lanes).chain(fixed.chunks(lanes)) {
                 let group = self.units.iter().filter(|unit| matches!(unit, Unit::Lanes(_))).count();
@@ -119,13 +125,15 @@ impl LooseJoints {
             self.seats[place] = (first_single + k) as u32;
         }
         self.impulses = vec![f32x4::ZERO; first_single + self.singles.len()];
-        self.groups.push_bodies(set, &self.seats);
+        if !self.one_by_one {
+            self.groups.push_bodies(set, &self.seats);
+        }
     }
 
     /// For the passes of a step.
     pub(super) fn running(&mut self) -> RunningLoose<'_> {
         RunningLoose {
-            lanes: self.groups.lanes(),
+            lanes: if self.one_by_one { 1 } else { self.groups.lanes() },
             groups: self.groups.shared(),
             singles: Shared::new(&mut self.singles),
             units: &self.units,
@@ -235,8 +243,10 @@ impl RunningLoose<'_> {
         let topology = &scene.set.topology;
         let all = &topology.bodies[topology.direct_bodies() as usize..];
         let seen = Seen { scene, states: &[], impulses: &self.impulses, bodies, step };
-        // SAFETY: a body is in one group, and no joint is visited in this stage.
-        unsafe { self.groups.stiffen(range.clone(), &seen) };
+        if self.lanes > 1 {
+            // SAFETY: a body is in one group, and no joint is visited in this stage.
+            unsafe { self.groups.stiffen(range.clone(), &seen) };
+        }
         let of_range = range.start * self.lanes..all.len().min(range.end * self.lanes);
         for info in all[of_range].iter().filter(|info| self.lanes == 1 || scene.props[info.body as usize].locked != 0) {
             let mut body = Store::get(bodies, info.body as usize);
