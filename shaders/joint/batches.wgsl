@@ -36,7 +36,7 @@ fn make_rows(place: u32) {
         joint_works[place].rows[which].kinds = vec3<u32>();
         joint_works[place].rows[which].gamma = vec3<f32>();
     }
-    if choose(place) {
+    if choose(place, 1.0) {
         rebuild(place);
     }
     for (var blocks = blocks_in_use(joint_works[place].axes); blocks != 0u; blocks &= blocks - 1u) {
@@ -143,7 +143,7 @@ fn begin(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
     }
     begin_joint(place);
     refresh(place);
-    carry_impulses(place);
+    carry_impulses(place, 1.0);
     make_rows(place);
 }
 

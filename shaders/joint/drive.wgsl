@@ -35,20 +35,20 @@ struct Motor {
 }
 
 // The piece that holds for an axis of a joint over a sub-step of length h, where `was` held before: no choice leaps from one
-// limit to the other.
-fn piece(axes: u32, flags: u32, frequency: f32, damping_ratio: f32, drive: JointDrive, axis: u32, at: AxisState, h: f32, was: u32) -> Piece {
+// limit to the other. The impulses of motors, friction and springs are `share` of those of the sub-step.
+fn piece(axes: u32, flags: u32, frequency: f32, damping_ratio: f32, drive: JointDrive, axis: u32, at: AxisState, h: f32, share: f32, was: u32) -> Piece {
     if at.response <= 0.0 {
         return Piece(PIECE_FIXED, 0.0, 0.0);
     }
     if ((axes >> (JOINT_LOCKED + axis)) & 1u) != 0u {
-        return locked_piece(flags, frequency, damping_ratio, at, h);
+        return locked_piece(flags, frequency, damping_ratio, at, h, share);
     }
     let limited = ((axes >> (JOINT_LIMITED + axis)) & 1u) != 0u;
     if limited && drive.low == drive.high {
         return Piece(PIECE_LOCKED, 0.0, -(at.coordinate - drive.low) / h);
     }
-    let motor = motor_of(axes, flags, drive, axis, at, h);
-    let rub = drive.friction * h;
+    let motor = motor_of(axes, flags, drive, axis, at, h, share);
+    let rub = drive.friction * h * share;
     let free = at.velocity - at.response * at.impulse;
     if limited {
         let to_low = min((drive.low - at.coordinate) / h, 0.0);
@@ -75,7 +75,7 @@ fn piece(axes: u32, flags: u32, frequency: f32, damping_ratio: f32, drive: Joint
 }
 
 // A locked axis, hard or soft.
-fn locked_piece(flags: u32, frequency: f32, damping_ratio: f32, at: AxisState, h: f32) -> Piece {
+fn locked_piece(flags: u32, frequency: f32, damping_ratio: f32, at: AxisState, h: f32, share: f32) -> Piece {
     if (flags & JOINT_SOFT) == 0u {
         return Piece(PIECE_LOCKED, 0.0, -at.coordinate / h);
     }
@@ -83,11 +83,11 @@ fn locked_piece(flags: u32, frequency: f32, damping_ratio: f32, at: AxisState, h
     let stiffness = frequency * frequency * mass;
     let damping = 2.0 * damping_ratio * frequency * mass;
     let gamma = 1.0 / (h * (damping + h * stiffness));
-    return Piece(PIECE_SOFT, gamma, -gamma * h * stiffness * at.coordinate);
+    return Piece(PIECE_SOFT, gamma / share, -gamma * h * stiffness * at.coordinate);
 }
 
 // The implicit spring and damper; nothing where there is none.
-fn motor_of(axes: u32, flags: u32, drive: JointDrive, axis: u32, at: AxisState, h: f32) -> Motor {
+fn motor_of(axes: u32, flags: u32, drive: JointDrive, axis: u32, at: AxisState, h: f32, share: f32) -> Motor {
     if ((axes >> (JOINT_MOTOR + axis)) & 1u) == 0u {
         return Motor(0.0, 0.0, 0.0);
     }
@@ -100,8 +100,9 @@ fn motor_of(axes: u32, flags: u32, drive: JointDrive, axis: u32, at: AxisState, 
         // The shorter way round.
         off -= TAU * round(off / TAU);
     }
-    let start = h * (damping * drive.target_vel - stiffness * off);
-    return Motor(start, h * (damping + h * stiffness), drive.max_force * h);
+    let given = h * share;
+    let start = given * (damping * drive.target_vel - stiffness * off);
+    return Motor(start, given * (damping + h * stiffness), drive.max_force * given);
 }
 
 fn motor_impulse(motor: Motor, velocity: f32) -> f32 {

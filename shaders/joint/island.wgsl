@@ -14,6 +14,8 @@
 
 // How often pieces are chosen in a sub-step.
 const CHOICES: u32 = 3u;
+// Share of a sub-step's impulses of motors, friction and springs that is given before bodies move, and once more after.
+const HALF: f32 = 0.5;
 const INVOCATIONS: u32 = 64u;
 // Solves of a relaxation.
 const TURNS: u32 = 2u;
@@ -273,8 +275,8 @@ fn begin(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
     storageBarrier();
     for (var k = island.first_joint + lid; k < island.first_joint + island.joint_count; k += INVOCATIONS) {
         refresh(k);
-        carry_impulses(k);
-        _ = choose(k);
+        carry_impulses(k, HALF);
+        _ = choose(k, HALF);
     }
     storageBarrier();
     for (var k = island.first_joint + lid; k < island.first_joint + island.joint_count; k += INVOCATIONS) {
@@ -299,12 +301,11 @@ fn solve(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
             if choice == 0u {
                 look(k);
             }
-            if choose(k) {
+            if choose(k, HALF) {
                 atomicOr(&shared_changed, 1u);
             }
             if choice == 0u {
-                joint_works[k].rows[0].impulse = vec3<f32>();
-                joint_works[k].rows[1].impulse = vec3<f32>();
+                forget_impulses(k);
                 predict(k);
             }
         }
@@ -346,6 +347,7 @@ fn relax(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
     let island = workgroupUniformLoad(&shared_island);
     for (var k = island.first_joint + lid; k < island.first_joint + island.joint_count; k += INVOCATIONS) {
         keep_impulses(k);
+        forget_impulses(k);
     }
     storageBarrier();
     for (var k = island.first_body + lid; k < island.first_body + island.body_count; k += INVOCATIONS) {
@@ -372,12 +374,15 @@ fn relax(@builtin(workgroup_id) wg: vec3<u32>, @builtin(num_workgroups) num: vec
         take_values(island, lid, turn != 0u);
         if turn == 0u {
             project_bodies(island, lid);
-        } else {
-            push_bodies(island, lid, false);
+            for (var k = island.first_joint + lid; k < island.first_joint + island.joint_count; k += INVOCATIONS) {
+                fix(k);
+            }
+            storageBarrier();
         }
+        push_bodies(island, lid, turn == 0u);
     }
     for (var k = island.first_joint + lid; k < island.first_joint + island.joint_count; k += INVOCATIONS) {
-        keep_impulses(k);
+        add_impulses(k);
     }
 }
 

@@ -250,8 +250,9 @@ fn active_velocities(place: u32, which: u32) -> vec3<f32> {
         - transpose(joint_works[place].rows[which].turn_a) * solver_bodies[ia].angular_velocity);
 }
 
-// Chooses the pieces of all rows for the velocities and impulses as they are. Whether the system is another one by it.
-fn choose(place: u32) -> bool {
+// Chooses the pieces of all rows for the velocities and impulses as they are, see `piece`. Whether the system is another
+// one by it.
+fn choose(place: u32, share: f32) -> bool {
     let slot = joint_works[place].slot;
     let axes = joint_works[place].axes;
     var changed = false;
@@ -270,7 +271,7 @@ fn choose(place: u32) -> bool {
             );
             let kind = joint_works[place].rows[which].kinds[row];
             var new_piece = piece(axes, joints[slot].flags, joints[slot].frequency, joints[slot].damping_ratio,
-                joints[slot].drives[axis], axis, at, step.h, kind);
+                joints[slot].drives[axis], axis, at, step.h, share, kind);
             let gamma = joint_works[place].rows[which].gamma[row];
             if kind == new_piece.kind && abs(gamma - new_piece.gamma) <= SAME_SPRING * gamma {
                 // Its goal goes with either.
@@ -367,18 +368,31 @@ fn off_by(place: u32, which: u32) -> vec3<f32> {
     return off;
 }
 
-// The impulses of the last sub-step, in the axes as they are now.
-fn carry_impulses(place: u32) {
+// A share of the impulses of the last sub-step, in the axes as they are now.
+fn carry_impulses(place: u32, share: f32) {
     let slot = joint_works[place].slot;
-    joint_works[place].rows[0].impulse = transpose(joint_works[place].along) * joint_states[slot].impulse;
-    joint_works[place].rows[1].impulse = transpose(joint_works[place].about) * joint_states[slot].torque;
+    joint_works[place].rows[0].impulse = transpose(joint_works[place].along) * (share * joint_states[slot].impulse);
+    joint_works[place].rows[1].impulse = transpose(joint_works[place].about) * (share * joint_states[slot].torque);
 }
 
-// What it gives its bodies in this sub-step, in the world.
+// Begins without impulses.
+fn forget_impulses(place: u32) {
+    joint_works[place].rows[0].impulse = vec3<f32>();
+    joint_works[place].rows[1].impulse = vec3<f32>();
+}
+
+// What it gives its bodies before they move, in the world.
 fn keep_impulses(place: u32) {
     let slot = joint_works[place].slot;
     joint_states[slot].impulse = joint_works[place].along * joint_works[place].rows[0].impulse;
     joint_states[slot].torque = joint_works[place].about * joint_works[place].rows[1].impulse;
+}
+
+// And what it gives them after that.
+fn add_impulses(place: u32) {
+    let slot = joint_works[place].slot;
+    joint_states[slot].impulse += joint_works[place].along * joint_works[place].rows[0].impulse;
+    joint_states[slot].torque += joint_works[place].about * joint_works[place].rows[1].impulse;
 }
 
 // What rows of a fixed impulse are still to give; others give nothing.

@@ -85,14 +85,14 @@ impl Loose {
         }
         let mut work = Work::new(slot, joint, state, between(scene, slots), step.h);
         work.refresh(joint, &a, &b);
-        work.carry_impulses();
+        work.carry_impulses(1.0);
         (Self::of(&mut work, scene, &a, &b, step), work.state)
     }
 
     /// The rows of `work`, whose axes and impulses are those of now.
     fn of(work: &mut Work, scene: &Scene<'_>, a: &Body, b: &Body, step: &StepParams) -> Self {
         let joint = &scene.set.joints[work.slot as usize];
-        if work.choose(joint, a, b, step.h) {
+        if work.choose(joint, a, b, step.h, 1.0) {
             work.rebuild(a, b);
         }
         let mut loose = Self {

@@ -52,26 +52,26 @@ pub struct AxisState {
     pub response: f32,
 }
 
-/// The piece that holds for axis `axis` of the joint, over a sub-step of length `h`, where `was` held before. No choice leaps
-/// from one limit to the other: impulses are those of all rows together, and in a corner of several limits they may be
+/// The piece that holds for axis `axis` of the joint, over a sub-step of length `h`, where `was` held before. The impulses of
+/// motors, friction and springs are `share` of those of the sub-step. No choice leaps from one limit to the other: impulses are those of all rows together, and in a corner of several limits they may be
 /// so large that an axis seems to fly past all of its range. What is beyond a limit stands still there until the poses
 /// are projected.
-pub fn piece(joint: &Joint, axis: usize, at: &AxisState, h: f32, was: u32) -> Piece {
+pub fn piece(joint: &Joint, axis: usize, at: &AxisState, h: f32, share: f32, was: u32) -> Piece {
     let has = |bit: u32| joint.axes >> (bit + axis as u32) & 1 != 0;
     if at.response <= 0.0 {
         // Neither body can be moved this way.
         return Piece { kind: kind::FIXED, gamma: 0.0, goal: 0.0, off: 0.0 };
     }
     if has(joint_bits::LOCKED) {
-        return locked(joint, at, h);
+        return locked(joint, at, h, share);
     }
     let drive = &joint.drives[axis];
     if has(joint_bits::LIMITED) && drive.low == drive.high {
         let off = at.coordinate - drive.low;
         return Piece { kind: kind::LOCKED, gamma: 0.0, goal: -off / h, off };
     }
-    let motor = Motor::of(joint, axis, has(joint_bits::MOTOR), at, h);
-    let rub = drive.friction * h;
+    let motor = Motor::of(joint, axis, has(joint_bits::MOTOR), at, h, share);
+    let rub = drive.friction * h * share;
     let free = at.velocity - at.response * at.impulse;
     let needed = |velocity: f32| (velocity - free) / at.response;
     let rubs = |velocity: f32| if velocity > 0.0 { -rub } else { rub };
@@ -101,7 +101,7 @@ pub fn piece(joint: &Joint, axis: usize, at: &AxisState, h: f32, was: u32) -> Pi
 }
 
 /// A locked axis, hard or soft.
-fn locked(joint: &Joint, at: &AxisState, h: f32) -> Piece {
+fn locked(joint: &Joint, at: &AxisState, h: f32, share: f32) -> Piece {
     if joint.flags & joint_bits::SOFT == 0 {
         return Piece { kind: kind::LOCKED, gamma: 0.0, goal: -at.coordinate / h, off: at.coordinate };
     }
@@ -109,7 +109,7 @@ fn locked(joint: &Joint, at: &AxisState, h: f32) -> Piece {
     let stiffness = joint.frequency * joint.frequency * mass;
     let damping = 2.0 * joint.damping_ratio * joint.frequency * mass;
     let gamma = 1.0 / (h * (damping + h * stiffness));
-    Piece { kind: kind::SOFT, gamma, goal: -gamma * h * stiffness * at.coordinate, off: 0.0 }
+    Piece { kind: kind::SOFT, gamma: gamma / share, goal: -gamma * h * stiffness * at.coordinate, off: 0.0 }
 }
 
 /// Impulse = start - slope velocity, between -most and most.
@@ -121,7 +121,7 @@ struct Motor {
 
 impl Motor {
     /// The implicit spring and damper; nothing where there is none.
-    fn of(joint: &Joint, axis: usize, is: bool, at: &AxisState, h: f32) -> Self {
+    fn of(joint: &Joint, axis: usize, is: bool, at: &AxisState, h: f32, share: f32) -> Self {
         if !is {
             return Self { start: 0.0, slope: 0.0, most: 0.0 };
         }
@@ -134,8 +134,9 @@ impl Motor {
             // The shorter way round.
             off -= TAU * (off / TAU).round_ties_even();
         }
-        let start = h * (damping * drive.target_vel - stiffness * off);
-        Self { start, slope: h * (damping + h * stiffness), most: drive.max_force * h }
+        let given = h * share;
+        let start = given * (damping * drive.target_vel - stiffness * off);
+        Self { start, slope: given * (damping + h * stiffness), most: drive.max_force * given }
     }
 
     fn impulse(&self, velocity: f32) -> f32 {

@@ -19,6 +19,9 @@ pub const REGULARIZATION: f32 = 1e-6;
 pub const CYCLE_REGULARIZATION: f32 = 1e-5;
 /// How often pieces are chosen in a sub-step.
 pub const CHOICES: u32 = 3;
+/// Share of a sub-step's impulses of motors, friction and springs that is given before bodies move, and once more after:
+/// as gravity, or springs would sag by what they give against one half of it only.
+pub const HALF: f32 = 0.5;
 
 /// The joints of an island and their bodies, while a step runs.
 #[derive(Debug, Default, Clone)]
@@ -85,8 +88,8 @@ impl Island {
         for (work, &[a, b]) in self.works.iter_mut().zip(&self.ends) {
             let joint = &scene.set.joints[work.slot as usize];
             work.refresh(joint, &self.bodies[a], &self.bodies[b]);
-            work.carry_impulses();
-            work.choose(joint, &self.bodies[a], &self.bodies[b], step.h);
+            work.carry_impulses(HALF);
+            work.choose(joint, &self.bodies[a], &self.bodies[b], step.h, HALF);
             work.rebuild(&self.bodies[a], &self.bodies[b]);
         }
         self.factor(scene);
@@ -150,7 +153,7 @@ impl Island {
         for (work, &[a, b]) in self.works.iter_mut().zip(&self.ends) {
             let (joint, a, b) = (&scene.set.joints[work.slot as usize], &self.bodies[a], &self.bodies[b]);
             work.look(joint, a, b);
-            changed |= work.choose(joint, a, b, step.h);
+            changed |= work.choose(joint, a, b, step.h, HALF);
             work.forget_impulses();
             remainders.push(work.remainders(joint, a, b, step.h));
         }
@@ -168,7 +171,7 @@ impl Island {
             if choice + 1 < CHOICES {
                 for (work, &[a, b]) in self.works.iter_mut().zip(&self.ends) {
                     let joint = &scene.set.joints[work.slot as usize];
-                    changed |= work.choose(joint, &self.bodies[a], &self.bodies[b], step.h);
+                    changed |= work.choose(joint, &self.bodies[a], &self.bodies[b], step.h, HALF);
                 }
             }
             if !changed {
@@ -183,17 +186,20 @@ impl Island {
         self.read(scene, bodies);
         let topology = &*scene.set.topology;
         self.works.iter_mut().for_each(Work::keep_impulses);
+        self.works.iter_mut().for_each(Work::forget_impulses);
         self.stiffen(scene, step);
         for (work, &[a, b]) in self.works.iter_mut().zip(&self.ends) {
             work.refresh(&scene.set.joints[work.slot as usize], &self.bodies[a], &self.bodies[b]);
         }
         self.factor(scene);
         self.project(scene);
+        self.works.iter_mut().for_each(Work::fix);
+        self.push(|work, second, body| work.push_fixed(second, body));
         self.solve_rows(topology, |island, joint, which| {
             let [a, b] = island.ends[joint];
             island.works[joint].lack(which, &island.bodies[a], &island.bodies[b], true)
         });
-        self.works.iter_mut().for_each(Work::keep_impulses);
+        self.works.iter_mut().for_each(Work::add_impulses);
         self.write(scene, bodies, true);
     }
 

@@ -192,13 +192,13 @@ impl Work {
         Self { slot, axes, state, between, frame: frame(joint, &still, &still, between), blocks }
     }
 
-    /// The impulses of the last sub-step, in the axes as they are now.
-    pub fn carry_impulses(&mut self) {
-        self.blocks[0].impulse = self.frame.along.transpose() * vec3(self.state.impulse);
-        self.blocks[1].impulse = self.frame.about.transpose() * vec3(self.state.torque);
+    /// A share of the impulses of the last sub-step, in the axes as they are now.
+    pub fn carry_impulses(&mut self, share: f32) {
+        self.blocks[0].impulse = self.frame.along.transpose() * (share * vec3(self.state.impulse));
+        self.blocks[1].impulse = self.frame.about.transpose() * (share * vec3(self.state.torque));
     }
 
-    /// Begins a sub-step without impulses.
+    /// Begins without impulses.
     pub fn forget_impulses(&mut self) {
         self.blocks.iter_mut().for_each(|block| block.impulse = Vec3::ZERO);
     }
@@ -244,8 +244,9 @@ impl Work {
         }
     }
 
-    /// Chooses the pieces of all rows for the velocities and impulses as they are. Whether the system is another one by it.
-    pub fn choose(&mut self, joint: &Joint, a: &Body, b: &Body, h: f32) -> bool {
+    /// Chooses the pieces of all rows for the velocities and impulses as they are, see [`piece`]. Whether the system is
+    /// another one by it.
+    pub fn choose(&mut self, joint: &Joint, a: &Body, b: &Body, h: f32, share: f32) -> bool {
         if joint.flags & joint_bits::SOFT == 0 && self.axes >> joint_bits::DRIVEN & 63 == 0 {
             return self.choose_locked(h);
         }
@@ -256,7 +257,7 @@ impl Work {
             }
             let (which, row) = (axis / 3, axis % 3);
             let was = self.blocks[which].pieces[row].kind;
-            let mut new = piece(joint, axis, &self.at(which, row, a, b), h, was);
+            let mut new = piece(joint, axis, &self.at(which, row, a, b), h, share, was);
             let piece = &mut self.blocks[which].pieces[row];
             if piece.kind == new.kind && (piece.gamma - new.gamma).abs() <= SAME_SPRING * piece.gamma {
                 // Its goal goes with either.
@@ -433,11 +434,18 @@ impl Work {
         [separation.length(), angle.length()]
     }
 
-    /// What it gives its bodies in this sub-step, in the world.
+    /// What it gives its bodies before they move, in the world.
     pub fn keep_impulses(&mut self) {
         let [along, about] = &self.blocks;
         self.state.impulse = (self.frame.along * along.impulse).to_array();
         self.state.torque = (self.frame.about * about.impulse).to_array();
+    }
+
+    /// And what it gives them after that.
+    pub fn add_impulses(&mut self) {
+        let [along, about] = &self.blocks;
+        self.state.impulse = (vec3(self.state.impulse) + self.frame.along * along.impulse).to_array();
+        self.state.torque = (vec3(self.state.torque) + self.frame.about * about.impulse).to_array();
     }
 }
 
