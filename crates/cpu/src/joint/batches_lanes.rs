@@ -4,7 +4,7 @@
 
 use super::batches::{LEAK, MASS_SHARE, SHARE};
 use super::island::REGULARIZATION;
-use super::lanes::{Held, Symmetric, product, rotate};
+use super::joined_lanes::{Held, Symmetric, product, rotate};
 use super::turn_lanes::rotation_vector;
 use crate::bounds::moves;
 use crate::math::vec3;
@@ -19,7 +19,7 @@ pub(super) const NO_JOINT: u32 = u32::MAX;
 
 /// Whether a joint can be solved in lanes: its anchors are locked, its angles all or none, nothing drives it, and
 /// nothing of it is soft.
-pub(super) fn is_plain_lock(joint: &Joint) -> bool {
+pub(super) fn fits_lanes(joint: &Joint) -> bool {
     let odd = joint_bits::SOFT | joint_bits::COUPLED;
     let axes = joint.axes >> joint_bits::LOCKED & 63;
     joint.flags & odd == 0 && joint.axes >> joint_bits::DRIVEN & 63 == 0 && (axes == 7 || axes == 63)

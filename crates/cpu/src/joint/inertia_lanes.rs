@@ -1,6 +1,6 @@
 //! The inertia of the bodies of batches, several at a time: [`stiffen`](super::batches::stiffen).
 
-use super::lanes::{Symmetric, axes, choose, normalized, product, rotate};
+use super::joined_lanes::{Symmetric, axes, choose, normalized, product, rotate};
 use super::rows::STIFFENING;
 use crate::shared::Shared;
 use crate::solver::lanes::{BodyRows, NO_BODY, Places, START};

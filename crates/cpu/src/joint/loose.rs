@@ -3,7 +3,7 @@
 
 use super::Part;
 use super::batches::{Loose, stiffen};
-use super::batches_lanes::{is_plain_lock, locks_angles};
+use super::batches_lanes::{fits_lanes, locks_angles};
 use super::groups::{Groups, Seen, SharedGroups};
 use super::island::{Scene, Store};
 use super::rows::{Body, breaks};
@@ -101,7 +101,7 @@ impl LooseJoints {
             let places = batch[0] as usize..batch[1] as usize;
             let joint = |place: &usize| &set.joints[topology.joints[*place] as usize];
             let (alike, others): (Vec<_>, Vec<_>) =
-                places.partition(|place| !self.one_by_one && is_plain_lock(joint(place)));
+                places.partition(|place| !self.one_by_one && fits_lanes(joint(place)));
             let (fixed, balls): (Vec<_>, Vec<_>) = alike.into_iter().partition(|place| locks_angles(joint(place)));
             for places in balls.chunks(lanes).chain(fixed.chunks(lanes)) {
                 let group = self.units.iter().filter(|unit| matches!(unit, Unit::Lanes(_))).count();

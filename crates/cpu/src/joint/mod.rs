@@ -12,7 +12,7 @@ pub mod frame;
 mod groups;
 mod inertia_lanes;
 pub mod island;
-mod lanes;
+mod joined_lanes;
 mod loose;
 pub mod rows;
 mod turn_lanes;

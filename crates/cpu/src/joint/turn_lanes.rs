@@ -1,6 +1,6 @@
 //! The rotation vector of [`frame`](super::frame), several at a time.
 
-use super::lanes::{choose, length, product, rotate};
+use super::joined_lanes::{choose, length, product, rotate};
 use crate::solver::simd::{Lanes, V3};
 
 /// Axes in the world and coordinates of joints that lock all angles, from their frames at both bodies.

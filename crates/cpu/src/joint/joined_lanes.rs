@@ -1,4 +1,4 @@
-//! Words of the files called `_lanes`: symmetric matrices, rotations, and bodies between two joints, several at a time.
+//! What joints of batches in lanes are told in: symmetric matrices, rotations, and bodies between two joints, several at a time.
 
 use crate::shared::Shared;
 use crate::solver::lanes::BodyLanes;
