@@ -16,6 +16,10 @@ pub(crate) struct Shared<'a, T> {
 unsafe impl<T: Copy + Send> Sync for Shared<'_, T> {}
 
 impl<T: Copy> Shared<'_, T> {
+    pub(crate) fn len(&self) -> usize {
+        self.len
+    }
+
     /// Elements `range`, for this thread alone.
     ///
     /// # Safety
@@ -39,6 +43,29 @@ impl<'a, T: Pod> Shared<'a, T> {
 impl<'a, T: Copy> Shared<'a, T> {
     pub(crate) fn new(slice: &'a mut [T]) -> Self {
         Self { start: slice.as_mut_ptr(), len: slice.len(), lifetime: PhantomData }
+    }
+
+    /// Elements `N * index` to `N * index + N - 1`.
+    ///
+    /// # Safety
+    /// No thread writes any of them while the reference lives.
+    #[inline(always)]
+    pub(crate) unsafe fn chunk<const N: usize>(&self, index: usize) -> &[T; N] {
+        assert!(index < self.len / N);
+        // SAFETY: in bounds by the assertion; nobody writes it meanwhile, by the caller's promise.
+        unsafe { &*self.start.add(N * index).cast() }
+    }
+
+    /// The same, for this thread alone.
+    ///
+    /// # Safety
+    /// As for [`Shared::slice_mut`].
+    #[expect(clippy::mut_from_ref, reason = "callers keep the chunks apart")]
+    #[inline(always)]
+    pub(crate) unsafe fn chunk_mut<const N: usize>(&self, index: usize) -> &mut [T; N] {
+        assert!(index < self.len / N);
+        // SAFETY: in bounds by the assertion; nobody else touches it meanwhile, by the caller's promise.
+        unsafe { &mut *self.start.add(N * index).cast() }
     }
 
     /// Reads one element.

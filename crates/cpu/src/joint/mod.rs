@@ -6,22 +6,29 @@
 //! Gauss-Seidel, batch by batch (`batches`); both with the geometric stiffness of joints as inertia.
 
 pub mod batches;
+mod batches_lanes;
 pub mod drive;
 pub mod frame;
+mod groups;
 pub mod held;
 pub mod inertia;
+mod inertia_lanes;
 pub mod island;
+mod joined_lanes;
+mod loose;
 pub mod rows;
+mod turn_lanes;
 
 use crate::bounds::moves;
-use crate::math::{finite, vec3};
+use crate::math::finite;
 use crate::shared::Shared;
-use batches::Loose;
+use crate::workers::blocks;
 use bytemuck::Zeroable;
 use island::{Island, Scene, Store};
-use rows::Body;
+use loose::{LooseJoints, RunningLoose};
+use rayon::prelude::*;
 use std::ops::Range;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use tumble_core::JointSet;
 use tumble_core::layout::{
     BREAK_NAMES, BodyProps, BodyState, Control, Joint, JointIsland, JointState, SolverBody, StepParams, joint_bits,
@@ -49,23 +56,14 @@ pub enum Part {
     RelaxLoose,
 }
 
-impl Part {
-    /// Whether it is about islands that are solved directly.
-    pub fn is_of_islands(self) -> bool {
-        matches!(self, Self::Begin | Self::Solve | Self::Relax)
-    }
-}
-
 /// The joints of a world.
 #[derive(Debug, Default)]
 pub struct Joints {
     /// What lasts of each joint, by slot.
     pub states: Vec<JointState>,
     islands: Vec<Mutex<Island>>,
-    /// Joints of batches, by their place behind those of islands.
-    loose: Vec<Loose>,
-    /// What lasts of those, in the same order.
-    loose_states: Vec<JointState>,
+    /// Joints of batches.
+    loose: LooseJoints,
 }
 
 /// Joints in a step: what all threads see.
@@ -73,8 +71,7 @@ pub struct Running<'a> {
     scene: Scene<'a>,
     states: &'a [JointState],
     islands: &'a [Mutex<Island>],
-    loose: Shared<'a, Loose>,
-    loose_states: Shared<'a, JointState>,
+    loose: RunningLoose<'a>,
 }
 
 impl Store for Shared<'_, SolverBody> {
@@ -90,14 +87,19 @@ impl Store for Shared<'_, SolverBody> {
 }
 
 impl Joints {
+    /// Joints of batches so many side by side at most, instead of as many as the processor takes; none if that is not a
+    /// number that it takes. Results with one differ from the others by rounding, those with several do not.
+    #[doc(hidden)]
+    pub fn with_lanes(lanes: usize) -> Option<Self> {
+        Some(Self { loose: LooseJoints::with_lanes(lanes)?, ..Self::default() })
+    }
+
     /// Room for the joints of a step.
-    pub fn reserve(&mut self, set: &JointSet) {
+    pub fn reserve(&mut self, set: &Arc<JointSet>) {
         let topology = &set.topology;
         self.states.resize(set.joints.len(), JointState::zeroed());
         self.islands.resize_with(topology.islands.len(), Mutex::default);
-        let loose = (topology.joint_count() - topology.direct_joints()) as usize;
-        self.loose.resize(loose, Loose::default());
-        self.loose_states.resize(loose, JointState::zeroed());
+        self.loose.build(set);
     }
 
     /// The passes of a step over these joints.
@@ -111,8 +113,7 @@ impl Joints {
             scene: Scene { set, states, props },
             states: &self.states,
             islands: &self.islands,
-            loose: Shared::new(&mut self.loose),
-            loose_states: Shared::new(&mut self.loose_states),
+            loose: self.loose.running(),
         }
     }
 
@@ -125,25 +126,20 @@ impl Joints {
         step: &StepParams,
         control: &mut Control,
     ) {
-        let first = set.topology.direct_joints() as usize;
-        let all = &mut self.states;
-        let mut keep = |slot: u32, new: JointState| {
+        let all = Shared::new(&mut self.states);
+        let broke = Mutex::new(Vec::new());
+        let keep = |slot: u32, new: JointState| {
             let joint = &set.joints[slot as usize];
-            let state = &mut all[slot as usize];
-            let was_whole = !is_broken(joint, state);
-            *state = kept(new);
-            if was_whole && is_broken(joint, state) {
-                name(control, slot);
+            // SAFETY: a joint is kept once.
+            let was_whole = !is_broken(joint, &unsafe { all.get(slot as usize) });
+            let state = kept(new);
+            // SAFETY: as above.
+            unsafe { all.set(slot as usize, state) };
+            if was_whole && is_broken(joint, &state) {
+                broke.lock().expect("no thread panicked with it").push(slot);
             }
         };
-        for (place, (loose, state)) in self.loose.iter().zip(&self.loose_states).enumerate() {
-            let moving = loose.bodies.into_iter().find(|&slot| moves(states[slot as usize].flags));
-            if moving.is_some_and(|slot| bodies[slot as usize].level == step.level) {
-                let slot = set.topology.joints[first + place];
-                let broken = state.broken | u32::from(rows::breaks(&set.joints[slot as usize], state));
-                keep(slot, JointState { broken, ..*state });
-            }
-        }
+        self.loose.for_each_lasting(set, &all, states, bodies, step, &keep);
         for (info, island) in set.topology.islands.iter().zip(&mut self.islands) {
             if level(set, info, states, |slot| bodies[slot].level) != Some(step.level) {
                 continue;
@@ -152,11 +148,13 @@ impl Joints {
             let slots = &set.topology.joints[info.first_joint as usize..][..info.joint_count as usize];
             slots.iter().zip(island.states(set)).for_each(|(&slot, state)| keep(slot, state));
         }
+        broke.into_inner().expect("no thread panicked with it").into_iter().for_each(|slot| name(control, slot));
     }
 
     /// How many are broken.
     pub(crate) fn broken(&self, set: &JointSet) -> u32 {
-        set.joints.iter().zip(&self.states).map(|(joint, state)| u32::from(is_broken(joint, state))).sum()
+        let all = set.joints.par_iter().zip(&self.states).with_min_len(1024);
+        all.map(|(joint, state)| u32::from(is_broken(joint, state))).sum()
     }
 }
 
@@ -181,89 +179,26 @@ fn kept(state: JointState) -> JointState {
 }
 
 impl Running<'_> {
-    /// The stages of a part of a sub-step: each a range of islands, bodies or joints that threads may share.
-    pub fn stages(&self, part: Part) -> Vec<Range<usize>> {
+    /// The stages of a part of a sub-step: each a range of what threads may share, and into how many blocks it is cut.
+    pub(crate) fn stages(&self, part: Part) -> Vec<(Range<usize>, u32)> {
         let topology = &self.scene.set.topology;
-        let first = topology.direct_joints() as usize;
-        let batches = topology.batches.windows(2).map(|b| b[0] as usize - first..b[1] as usize - first);
-        let one = match part {
-            Part::Begin | Part::Solve | Part::Relax => 0..topology.islands.len(),
-            Part::BeginLoose => 0..topology.joints.len() - first,
-            Part::Stiffen => topology.direct_bodies() as usize..topology.bodies.len(),
-            Part::WarmStartLoose | Part::SolveLoose | Part::RelaxLoose => return batches.collect(),
-        };
-        std::iter::once(one).collect()
+        match part {
+            Part::Begin | Part::Solve | Part::Relax => {
+                let islands = topology.islands.len();
+                vec![(0..islands, blocks(islands, 1))]
+            }
+            _ => self.loose.stages(part, topology.bodies.len() - topology.direct_bodies() as usize),
+        }
     }
 
-    /// Some of a stage's islands, bodies or joints. Those of a stage share nothing that is written.
+    /// Some of a stage. What is in a range shares nothing that is written with the rest.
     pub(crate) fn run(&self, part: Part, range: Range<usize>, bodies: &Shared<'_, SolverBody>, step: &StepParams) {
         match part {
             Part::Begin | Part::Solve | Part::Relax => {
-                range.for_each(|index| self.run_island(part, index, bodies, step))
+                range.for_each(|index| self.run_island(part, index, bodies, step));
             }
-            Part::Stiffen => range.for_each(|index| self.stiffen(index, bodies, step)),
-            _ => {
-                // SAFETY: a joint is in one block of one stage.
-                let (loose, states) =
-                    unsafe { (self.loose.slice_mut(range.clone()), self.loose_states.slice_mut(range.clone())) };
-                let first = self.scene.set.topology.direct_joints() as usize + range.start;
-                for (index, (loose, state)) in loose.iter_mut().zip(states).enumerate() {
-                    let slot = self.scene.set.topology.joints[first + index];
-                    if part == Part::BeginLoose {
-                        let state_of = self.states[slot as usize];
-                        (*loose, *state) = Loose::begin(&self.scene, slot, state_of, bodies, step);
-                    } else {
-                        self.visit(part, slot, loose, state, bodies, step);
-                    }
-                }
-            }
-        }
-    }
-
-    fn visit(
-        &self,
-        part: Part,
-        slot: u32,
-        loose: &mut Loose,
-        state: &mut JointState,
-        bodies: &Shared<'_, SolverBody>,
-        step: &StepParams,
-    ) {
-        let [ia, ib] = loose.bodies.map(|slot| slot as usize);
-        // What does not move is read by many.
-        let is_moved = |slot: usize| moves(self.scene.states[slot].flags);
-        // SAFETY: joints of a batch share no body that moves, and only those are written.
-        let [mut copy_a, mut copy_b] = [ia, ib].map(|slot| (!is_moved(slot)).then(|| Store::get(bodies, slot)));
-        let [a, b] = [(ia, &mut copy_a), (ib, &mut copy_b)].map(|(slot, copy)| match copy {
-            Some(copy) => copy,
-            // SAFETY: as above.
-            None => unsafe { &mut bodies.slice_mut(slot..slot + 1)[0] },
-        });
-        if (if is_moved(ia) { a.level } else { b.level }) != step.level || !(is_moved(ia) || is_moved(ib)) {
-            return;
-        }
-        let [mut seen_a, mut seen_b] = match part {
-            Part::RelaxLoose => [Body::of(a, &self.scene.states[ia]), Body::of(b, &self.scene.states[ib])],
-            _ => [Body::still(a), Body::still(b)],
-        };
-        match part {
-            Part::WarmStartLoose => loose.warm_start(&mut seen_a, &mut seen_b),
-            Part::SolveLoose => loose.solve(&mut seen_a, &mut seen_b),
-            _ => loose.relax(&self.scene, state, slot, &mut seen_a, &mut seen_b, step),
-        }
-        seen_a.put_velocities(a);
-        seen_b.put_velocities(b);
-    }
-
-    fn stiffen(&self, index: usize, bodies: &Shared<'_, SolverBody>, step: &StepParams) {
-        let info = &self.scene.set.topology.bodies[index];
-        let first = self.scene.set.topology.direct_joints();
-        let mut body = Store::get(bodies, info.body as usize);
-        // SAFETY: no joint is written in this stage.
-        let impulse = |place: u32| vec3(unsafe { self.loose_states.get((place - first) as usize) }.impulse);
-        if body.level == step.level {
-            batches::stiffen(&self.scene, info, impulse, &mut body, step);
-            Store::set(bodies, info.body as usize, body);
+            Part::Stiffen => self.loose.stiffen(range, &self.scene, bodies, step),
+            _ => self.loose.visit(part, range, &self.scene, self.states, bodies, step),
         }
     }
 

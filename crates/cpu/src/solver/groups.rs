@@ -2,7 +2,7 @@
 
 #[cfg(target_arch = "x86_64")]
 use super::avx2::{self, F32x8};
-use super::lanes::ConstraintLanes;
+use super::lanes::{BodyRows, ConstraintLanes};
 use super::prepare::{self, Contact};
 use super::simd::Lanes;
 use super::store::Solved;
@@ -132,7 +132,7 @@ fn build<'c, L: Lanes>(
     head: impl Fn(&Contact<'_>) -> ConstraintHead + Sync,
 ) {
     groups.resize(members.len(), ConstraintLanes::empty());
-    let rows = bytemuck::cast_slice::<SolverBody, f32x4>(bodies);
+    let rows = bytemuck::cast_slice::<SolverBody, BodyRows>(bodies);
     groups.par_iter_mut().zip(members).with_min_len(128 / L::COUNT).for_each(|(group, &(first, count))| {
         *group = ConstraintLanes::empty();
         for lane in 0..count as usize {

@@ -191,16 +191,39 @@ pub(crate) const ROWS: usize = size_of::<SolverBody>() / 16;
 /// Row of the linear start with the weight; the next one has the angular start with what is weighted.
 pub(crate) const START: usize = 6;
 
-/// Row `r` of each body, as its four numbers of all bodies.
-#[inline(always)]
-fn columns<L: Lanes>(read: &impl Fn(usize) -> f32x4, index: L::Indices, r: usize) -> [L; 4] {
-    let mut rows = L::Rows::default();
-    for (row, &i) in rows.as_mut().iter_mut().zip(index.as_ref()) {
-        if i != NO_BODY {
-            *row = read(ROWS * i as usize + r);
+/// All of a body, in rows.
+pub(crate) type BodyRows = [f32x4; ROWS];
+
+/// Most lanes there are.
+const MOST: usize = 8;
+
+/// In place of the rows where there is no body.
+static NO_ROWS: BodyRows = [f32x4::ZERO; ROWS];
+
+/// A body of each lane: looked up once for all its rows.
+pub(crate) struct Places<'a>([&'a BodyRows; MOST]);
+
+impl<'a> Places<'a> {
+    #[inline(always)]
+    pub(crate) fn new<L: Lanes>(body: impl Fn(usize) -> &'a BodyRows, index: L::Indices) -> Self {
+        let mut places = [&NO_ROWS; MOST];
+        for (place, &i) in places.iter_mut().zip(index.as_ref()) {
+            if i != NO_BODY {
+                *place = body(i as usize);
+            }
         }
+        Self(places)
     }
-    L::columns(rows)
+
+    /// Row `r` of each body, as its four numbers of all bodies.
+    #[inline(always)]
+    pub(crate) fn columns<L: Lanes>(&self, r: usize) -> [L; 4] {
+        let mut rows = L::Rows::default();
+        for (row, place) in rows.as_mut().iter_mut().zip(&self.0) {
+            *row = place[r];
+        }
+        L::columns(rows)
+    }
 }
 
 /// Bodies of which any of these translations (`locks`) is locked.
@@ -210,17 +233,16 @@ fn locked<L: Lanes>(touched: L, locks: u32) -> L {
 }
 
 impl<L: Lanes> BodyLanes<L> {
-    /// Loads bodies by `read`, which gives element i of the bodies seen as rows; without their change of pose when
-    /// `moved` is false.
+    /// Loads bodies by `body`, which gives the rows of one; without their change of pose when `moved` is false.
     #[inline(always)]
-    pub(crate) fn gather(read: impl Fn(usize) -> f32x4, index: L::Indices, moved: bool) -> Self {
-        let (read, zero) = (&read, [L::ZERO; 4]);
-        let [vx, vy, vz, inverse_mass] = columns(read, index, 0);
-        let [wx, wy, wz, touched] = columns(read, index, 1);
-        let [tx, ty, tz, eigenvalue] = if moved { columns(read, index, 2) } else { zero };
-        let delta = if moved { columns(read, index, 3) } else { zero };
-        let [dx, dy, dz, _] = columns(read, index, 4);
-        let [ox, oy, oz, _] = columns(read, index, 5);
+    pub(crate) fn gather<'a>(body: impl Fn(usize) -> &'a BodyRows, index: L::Indices, moved: bool) -> Self {
+        let (places, zero) = (Places::new::<L>(body, index), [L::ZERO; 4]);
+        let [vx, vy, vz, inverse_mass] = places.columns(0);
+        let [wx, wy, wz, touched] = places.columns(1);
+        let [tx, ty, tz, eigenvalue] = if moved { places.columns(2) } else { zero };
+        let delta = if moved { places.columns(3) } else { zero };
+        let [dx, dy, dz, _] = places.columns(4);
+        let [ox, oy, oz, _] = places.columns(5);
         Self {
             linear: V3::new(vx, vy, vz),
             inverse_mass,
@@ -245,11 +267,36 @@ impl<L: Lanes> BodyLanes<L> {
         let angular = L::rows([self.angular.x, self.angular.y, self.angular.z, self.touched]);
         for (lane, &body) in index.as_ref().iter().enumerate() {
             if self.inverse_mass.as_array()[lane] > 0.0 {
-                let row = ROWS * body as usize;
                 // SAFETY: the caller's promise.
-                unsafe { bodies.set(row, linear.as_ref()[lane]) };
+                let rows: &mut BodyRows = unsafe { bodies.chunk_mut(body as usize) };
+                (rows[0], rows[1]) = (linear.as_ref()[lane], angular.as_ref()[lane]);
+            }
+        }
+    }
+
+    /// Stores the velocities as [`BodyLanes::scatter`], and counts by how much they are others than `before` to what the
+    /// sub-step began with.
+    ///
+    /// # Safety
+    /// As for that.
+    #[inline(always)]
+    pub(crate) unsafe fn scatter_with_start(
+        self,
+        bodies: &Shared<'_, f32x4>,
+        index: L::Indices,
+        [linear, angular]: [V3<L>; 2],
+    ) {
+        let (more, turn) = (self.linear - linear, self.angular - angular);
+        let (more, turn) = (L::rows([more.x, more.y, more.z, L::ZERO]), L::rows([turn.x, turn.y, turn.z, L::ZERO]));
+        let linear = L::rows([self.linear.x, self.linear.y, self.linear.z, self.inverse_mass]);
+        let angular = L::rows([self.angular.x, self.angular.y, self.angular.z, self.touched]);
+        for (lane, &body) in index.as_ref().iter().enumerate() {
+            if self.inverse_mass.as_array()[lane] > 0.0 {
                 // SAFETY: the caller's promise.
-                unsafe { bodies.set(row + 1, angular.as_ref()[lane]) };
+                let rows: &mut BodyRows = unsafe { bodies.chunk_mut(body as usize) };
+                (rows[0], rows[1]) = (linear.as_ref()[lane], angular.as_ref()[lane]);
+                rows[START] += more.as_ref()[lane];
+                rows[START + 1] += turn.as_ref()[lane];
             }
         }
     }

@@ -18,8 +18,6 @@ use wide::f32x4;
 
 /// Fewest groups of a block.
 const GROUPS: usize = 8;
-/// Fewest joints of a block.
-const JOINTS: usize = 64;
 /// Fewest bodies of a block.
 const BODIES: usize = 128;
 
@@ -71,11 +69,9 @@ pub(super) fn run(
             Pass::Bodies(_) => stages.push((pass, None, all.clone(), blocks(all.len(), BODIES))),
             Pass::Sweep(_) => stages.extend(parts.iter().map(|p| (pass, Some(p), p.groups.clone(), p.blocks))),
             Pass::Joints(part) => {
-                let ranges = joints.map_or(Vec::new(), |joints| joints.stages(part));
-                stages.extend(ranges.into_iter().filter(|range| !range.is_empty()).map(|range| {
-                    let least = if part.is_of_islands() { 1 } else { JOINTS };
-                    (pass, None, range.clone(), blocks(range.len(), least))
-                }));
+                let all = joints.map_or(Vec::new(), |joints| joints.stages(part));
+                let some = all.into_iter().filter(|(range, _)| !range.is_empty());
+                stages.extend(some.map(|(range, blocks)| (pass, None, range, blocks)));
             }
         }
     }
@@ -156,9 +152,11 @@ fn visit_group<L: Lanes>(visit: Visit, group: &mut ConstraintLanes<L>, bodies: &
     // SAFETY: no other thread moves these bodies meanwhile: constraints of one batch share none that moves, a part of
     // several batches is one block, and bodies that do not move are never written (`scatter`).
     let read = |i: usize| unsafe { bodies.get(i) };
+    // SAFETY: as above.
+    let body = |i: usize| unsafe { bodies.chunk(i) };
     let (ia, ib) = (group.head.body_a, group.head.body_b);
-    let mut a = BodyLanes::gather(read, ia, moved);
-    let mut b = BodyLanes::gather(read, ib, moved);
+    let mut a = BodyLanes::gather(body, ia, moved);
+    let mut b = BodyLanes::gather(body, ib, moved);
     match visit {
         Visit::WarmStart => group.warm_start(&mut a, &mut b),
         Visit::Solve | Visit::Relax => soft_lanes::visit(visit, group, &mut a, &mut b, step),

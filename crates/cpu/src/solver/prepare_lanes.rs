@@ -1,16 +1,15 @@
 //! The points of `prepare`, several constraints at a time: the same operations in the same order, so the same results.
 
-use super::lanes::{BodyLanes, ConstraintLanes};
+use super::lanes::{BodyLanes, BodyRows, ConstraintLanes};
 use super::push_lanes::arms;
 use super::simd::{Lanes, V3};
-use wide::f32x4;
 
 /// Fills in what follows from the geometry: tangents, the other arm, masses, approach. `bodies` as rows.
 #[inline(always)]
-pub(super) fn prepare<L: Lanes>(c: &mut ConstraintLanes<L>, bodies: &[f32x4]) {
+pub(super) fn prepare<L: Lanes>(c: &mut ConstraintLanes<L>, bodies: &[BodyRows]) {
     let (head, points) = c.split();
-    let a = BodyLanes::gather(|i| bodies[i], head.body_a, false);
-    let b = BodyLanes::gather(|i| bodies[i], head.body_b, false);
+    let a = BodyLanes::gather(|i| &bodies[i], head.body_a, false);
+    let b = BodyLanes::gather(|i| &bodies[i], head.body_b, false);
     let normal = head.normal;
     head.tangents = tangents(normal);
     let [t1, t2] = head.tangents;

@@ -110,6 +110,16 @@ impl World {
         self.adapter = format!("{} ({remark})", self.adapter);
     }
 
+    /// Before the first step: visits so many joints of large islands at a time, 1, 4 or 8, instead of as many as the processor
+    /// takes; false if that is not a number that it takes. One at a time differs from several by rounding.
+    #[doc(hidden)]
+    pub fn set_joint_lanes(&mut self, lanes: usize) -> bool {
+        let joints = crate::joint::Joints::with_lanes(lanes);
+        let is_one = joints.is_some();
+        self.kept.joints = joints.unwrap_or_default();
+        is_one
+    }
+
     /// Edits for the next step.
     pub fn edit(&mut self) -> &mut Editor {
         &mut self.editor
