@@ -9,6 +9,7 @@ pub mod batches;
 pub mod drive;
 pub mod frame;
 pub mod island;
+pub mod plan;
 pub mod rows;
 
 use crate::bounds::moves;
@@ -19,8 +20,8 @@ use bytemuck::Zeroable;
 use island::{Island, Scene, Store};
 use rows::Body;
 use std::ops::Range;
-use std::sync::Mutex;
-use tumble_core::JointSet;
+use std::sync::{Arc, Mutex};
+use tumble_core::{JointSet, Topology};
 use tumble_core::layout::{
     BREAK_NAMES, BodyProps, BodyState, Control, Joint, JointIsland, JointState, SolverBody, StepParams, joint_bits,
     touched,
@@ -60,6 +61,8 @@ pub struct Joints {
     /// What lasts of each joint, by slot.
     pub states: Vec<JointState>,
     islands: Vec<Mutex<Island>>,
+    /// What the islands were made for: the topology, and axes and flags of its joints.
+    made_for: (Arc<Topology>, Vec<[u32; 2]>),
     /// Joints of batches, by their place behind those of islands.
     loose: Vec<Loose>,
     /// What lasts of those, in the same order.
@@ -92,10 +95,27 @@ impl Joints {
     pub fn reserve(&mut self, set: &JointSet) {
         let topology = &set.topology;
         self.states.resize(set.joints.len(), JointState::zeroed());
-        self.islands.resize_with(topology.islands.len(), Mutex::default);
+        self.plan(set);
         let loose = (topology.joint_count() - topology.direct_joints()) as usize;
         self.loose.resize(loose, Loose::default());
         self.loose_states.resize(loose, JointState::zeroed());
+    }
+
+    /// Makes the islands anew where joints came or went, or are of another kind.
+    fn plan(&mut self, set: &JointSet) {
+        let kind = |&slot: &u32| [set.joints[slot as usize].axes, set.joints[slot as usize].flags];
+        let kinds = set.topology.joints[..set.topology.direct_joints() as usize].iter().map(kind);
+        if Arc::ptr_eq(&self.made_for.0, &set.topology) && self.made_for.1.iter().copied().eq(kinds.clone()) {
+            return;
+        }
+        self.made_for = (Arc::clone(&set.topology), kinds.collect());
+        self.islands.clear();
+        self.islands.resize_with(set.topology.islands.len(), Mutex::default);
+        for alike in plan::plans(set) {
+            for (place, slots) in alike.islands.into_iter().zip(alike.slots) {
+                self.islands[place] = Mutex::new(Island::new(Arc::clone(&alike.plan), slots));
+            }
+        }
     }
 
     /// The passes of a step over these joints.
