@@ -56,7 +56,7 @@ pub fn used(axes: u32, which: usize) -> u32 {
 }
 
 /// Shorter distances of the anchors have no direction, m.
-const SHORTEST: f32 = 1e-9;
+pub(super) const SHORTEST: f32 = 1e-9;
 
 fn axes_along(joint: &Joint, qa: Quat, offset: Vec3) -> (Mat3, Vec3) {
     if joint.flags & joint_bits::COUPLED != 0 {

@@ -7,25 +7,32 @@
 
 pub mod batches;
 pub mod drive;
+mod drive_lanes;
 pub mod frame;
+mod frame_lanes;
 pub mod island;
+mod island_lanes;
+mod lanes;
 pub mod plan;
 pub mod rows;
+mod rows_lanes;
+mod units;
 
 use crate::bounds::moves;
 use crate::math::{finite, vec3};
 use crate::shared::Shared;
 use batches::Loose;
 use bytemuck::Zeroable;
-use island::{Island, Scene, Store};
+use island::{Scene, Store};
 use rows::Body;
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
-use tumble_core::{JointSet, Topology};
 use tumble_core::layout::{
     BREAK_NAMES, BodyProps, BodyState, Control, Joint, JointIsland, JointState, SolverBody, StepParams, joint_bits,
     touched,
 };
+use tumble_core::{JointSet, Topology};
+use units::Unit;
 
 /// A part of a sub-step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,24 +63,39 @@ impl Part {
 }
 
 /// The joints of a world.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Joints {
     /// What lasts of each joint, by slot.
     pub states: Vec<JointState>,
-    islands: Vec<Mutex<Island>>,
-    /// What the islands were made for: the topology, and axes and flags of its joints.
+    units: Vec<Mutex<Box<dyn Unit>>>,
+    /// What the units were made for: the topology, and axes and flags of its joints.
     made_for: (Arc<Topology>, Vec<[u32; 2]>),
     /// Joints of batches, by their place behind those of islands.
     loose: Vec<Loose>,
     /// What lasts of those, in the same order.
     loose_states: Vec<JointState>,
+    /// Most islands that are solved side by side.
+    abreast: usize,
+}
+
+impl Default for Joints {
+    fn default() -> Self {
+        Self {
+            states: Vec::new(),
+            units: Vec::new(),
+            made_for: Default::default(),
+            loose: Vec::new(),
+            loose_states: Vec::new(),
+            abreast: units::most_abreast(),
+        }
+    }
 }
 
 /// Joints in a step: what all threads see.
 pub struct Running<'a> {
     scene: Scene<'a>,
     states: &'a [JointState],
-    islands: &'a [Mutex<Island>],
+    units: &'a [Mutex<Box<dyn Unit>>],
     loose: Shared<'a, Loose>,
     loose_states: Shared<'a, JointState>,
 }
@@ -109,13 +131,7 @@ impl Joints {
             return;
         }
         self.made_for = (Arc::clone(&set.topology), kinds.collect());
-        self.islands.clear();
-        self.islands.resize_with(set.topology.islands.len(), Mutex::default);
-        for alike in plan::plans(set) {
-            for (place, slots) in alike.islands.into_iter().zip(alike.slots) {
-                self.islands[place] = Mutex::new(Island::new(Arc::clone(&alike.plan), slots));
-            }
-        }
+        self.units = units::units(set, self.abreast);
     }
 
     /// The passes of a step over these joints.
@@ -128,7 +144,7 @@ impl Joints {
         Running {
             scene: Scene { set, states, props },
             states: &self.states,
-            islands: &self.islands,
+            units: &self.units,
             loose: Shared::new(&mut self.loose),
             loose_states: Shared::new(&mut self.loose_states),
         }
@@ -144,6 +160,11 @@ impl Joints {
         control: &mut Control,
     ) {
         let first = set.topology.direct_joints() as usize;
+        let scene = Scene { set, states, props: &[] };
+        let unit = |unit: &mut Mutex<Box<dyn Unit>>| {
+            unit.get_mut().expect("no thread panicked with it").store(&scene, &self.states, step)
+        };
+        let new: Vec<_> = self.units.iter_mut().flat_map(unit).collect();
         let all = &mut self.states;
         let mut keep = |slot: u32, new: JointState| {
             let joint = &set.joints[slot as usize];
@@ -162,14 +183,7 @@ impl Joints {
                 keep(slot, JointState { broken, ..*state });
             }
         }
-        for (info, island) in set.topology.islands.iter().zip(&mut self.islands) {
-            if level(set, info, states, |slot| bodies[slot].level) != Some(step.level) {
-                continue;
-            }
-            let island = island.get_mut().expect("no thread panicked with it");
-            let slots = &set.topology.joints[info.first_joint as usize..][..info.joint_count as usize];
-            slots.iter().zip(island.states(set)).for_each(|(&slot, state)| keep(slot, state));
-        }
+        new.into_iter().for_each(|(slot, state)| keep(slot, state));
     }
 
     /// How many are broken.
@@ -205,7 +219,7 @@ impl Running<'_> {
         let first = topology.direct_joints() as usize;
         let batches = topology.batches.windows(2).map(|b| b[0] as usize - first..b[1] as usize - first);
         let one = match part {
-            Part::Begin | Part::Solve | Part::Relax => 0..topology.islands.len(),
+            Part::Begin | Part::Solve | Part::Relax => 0..self.units.len(),
             Part::BeginLoose => 0..topology.joints.len() - first,
             Part::Stiffen => topology.direct_bodies() as usize..topology.bodies.len(),
             Part::WarmStartLoose | Part::SolveLoose | Part::RelaxLoose => return batches.collect(),
@@ -217,7 +231,10 @@ impl Running<'_> {
     pub(crate) fn run(&self, part: Part, range: Range<usize>, bodies: &Shared<'_, SolverBody>, step: &StepParams) {
         match part {
             Part::Begin | Part::Solve | Part::Relax => {
-                range.for_each(|index| self.run_island(part, index, bodies, step))
+                for index in range {
+                    let mut unit = self.units[index].lock().expect("no thread panicked with it");
+                    unit.run(part, &self.scene, self.states, bodies, step);
+                }
             }
             Part::Stiffen => range.for_each(|index| self.stiffen(index, bodies, step)),
             _ => {
@@ -284,20 +301,6 @@ impl Running<'_> {
             Store::set(bodies, info.body as usize, body);
         }
     }
-
-    fn run_island(&self, part: Part, index: usize, bodies: &Shared<'_, SolverBody>, step: &StepParams) {
-        let info = &self.scene.set.topology.islands[index];
-        let level = level(self.scene.set, info, self.scene.states, |slot| Store::get(bodies, slot).level);
-        if level != Some(step.level) {
-            return;
-        }
-        let mut island = self.islands[index].lock().expect("no thread panicked with it");
-        match part {
-            Part::Begin => island.begin(&self.scene, info, self.states, bodies, step),
-            Part::Solve => island.solve(&self.scene, bodies, step),
-            _ => island.relax(&self.scene, bodies, step),
-        }
-    }
 }
 
 /// Marks the bodies that joints move: see [`SolverBody::touched`].
@@ -310,8 +313,8 @@ pub fn mark(set: &JointSet, bodies: &mut [SolverBody]) {
 
 /// The level of sub-steps of an island that is solved directly, by that of each body; none where all its bodies sleep or
 /// are in quarantine: nothing is solved then, and what its joints remember stays.
-fn level(set: &JointSet, info: &JointIsland, states: &[BodyState], of: impl Fn(usize) -> u32) -> Option<u32> {
-    let bodies = &set.topology.bodies[info.first_body as usize..][..info.body_count as usize];
-    let awake = bodies.iter().map(|body| body.body as usize).find(|&slot| moves(states[slot].flags));
-    awake.map(of)
+fn level_of(scene: &Scene<'_>, info: &JointIsland, solver: &impl Store) -> Option<u32> {
+    let bodies = &scene.set.topology.bodies[info.first_body as usize..][..info.body_count as usize];
+    let awake = bodies.iter().map(|body| body.body as usize).find(|&slot| moves(scene.states[slot].flags));
+    awake.map(|slot| solver.get(slot).level)
 }

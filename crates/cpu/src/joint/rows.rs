@@ -176,15 +176,7 @@ impl Block {
 impl Work {
     /// A joint at the beginning of a step with sub-steps of length `h`.
     pub fn new(slot: u32, joint: &Joint, state: JointState, between: Vec3, h: f32) -> Self {
-        let fresh = JointState { tag: joint.generation + 1, h, ..JointState::zeroed() };
-        let mut state = if state.tag == fresh.tag { state } else { fresh };
-        let scale = if state.h == h || state.h == 0.0 { 1.0 } else { h / state.h };
-        state.impulse = state.impulse.map(|x| scale * x);
-        state.torque = state.torque.map(|x| scale * x);
-        state.h = h;
-        if state.broken != 0 {
-            (state.impulse, state.torque) = ([0.0; 3], [0.0; 3]);
-        }
+        let state = begun(joint, state, h);
         let axes = if state.broken != 0 { 0 } else { joint.axes };
         let still = Pose { translation: Vec3::ZERO, rotation: Quat::IDENTITY };
         let blocks = [Block::default(); 2];
@@ -446,6 +438,20 @@ impl Work {
         self.state.impulse = (vec3(self.state.impulse) + self.frame.along * along.impulse).to_array();
         self.state.torque = (vec3(self.state.torque) + self.frame.about * about.impulse).to_array();
     }
+}
+
+/// What a joint begins a step with that has sub-steps of length `h`.
+pub fn begun(joint: &Joint, state: JointState, h: f32) -> JointState {
+    let fresh = JointState { tag: joint.generation + 1, h, ..JointState::zeroed() };
+    let mut state = if state.tag == fresh.tag { state } else { fresh };
+    let scale = if state.h == h || state.h == 0.0 { 1.0 } else { h / state.h };
+    state.impulse = state.impulse.map(|x| scale * x);
+    state.torque = state.torque.map(|x| scale * x);
+    state.h = h;
+    if state.broken != 0 {
+        (state.impulse, state.torque) = ([0.0; 3], [0.0; 3]);
+    }
+    state
 }
 
 /// Whether the last sub-step asked for more than the joint bears.

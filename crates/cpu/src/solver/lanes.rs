@@ -193,7 +193,7 @@ pub(crate) const START: usize = 6;
 
 /// Row `r` of each body, as its four numbers of all bodies.
 #[inline(always)]
-fn columns<L: Lanes>(read: &impl Fn(usize) -> f32x4, index: L::Indices, r: usize) -> [L; 4] {
+pub(crate) fn columns<L: Lanes>(read: &impl Fn(usize) -> f32x4, index: L::Indices, r: usize) -> [L; 4] {
     let mut rows = L::Rows::default();
     for (row, &i) in rows.as_mut().iter_mut().zip(index.as_ref()) {
         if i != NO_BODY {

@@ -18,13 +18,13 @@
 //! Bounces come last.
 
 #[cfg(target_arch = "x86_64")]
-mod avx2;
+pub(crate) mod avx2;
 mod gauss_seidel;
 mod gauss_seidel_lanes;
 mod groups;
 mod jacobi;
 mod jacobi_lanes;
-mod lanes;
+pub(crate) mod lanes;
 pub mod one_pass;
 mod one_pass_lanes;
 mod passes;
@@ -36,7 +36,7 @@ mod push;
 mod push_lanes;
 mod resist;
 mod resist_lanes;
-mod simd;
+pub(crate) mod simd;
 mod soft;
 mod soft_lanes;
 pub mod split;
