@@ -41,6 +41,19 @@ pub(super) struct Softness<L> {
     damping_ratio: L,
 }
 
+impl<L: Lanes> AxisLanes<L> {
+    /// The impulse that takes the axis from the velocity that it has by itself to another one.
+    #[inline(always)]
+    fn needed(&self, velocity: L, free: L) -> L {
+        (velocity - free) / self.response
+    }
+}
+
+#[inline(always)]
+fn hard<L: Lanes>(number: u32, goal: L) -> PieceLanes<L> {
+    PieceLanes { kind: L::splat(number as f32), gamma: L::ZERO, goal }
+}
+
 impl<L: Lanes> DriveLanes<L> {
     pub(super) fn set(&mut self, lane: usize, joint: &Joint, axis: usize) {
         let from = &joint.drives[axis];
@@ -90,8 +103,7 @@ pub(super) fn piece<L: Lanes>(
     let motor = Motor::of(flags, axis, has(joint_bits::MOTOR), drive, at, [step, given]);
     let rub = drive.friction * step * L::splat(share);
     let free = at.velocity - at.response * at.impulse;
-    let needed = |velocity: L| (velocity - free) / at.response;
-    let more = needed(L::ZERO) - motor.impulse(L::ZERO);
+    let more = at.needed(L::ZERO, free) - motor.impulse(L::ZERO);
     let rubbed = more.simd_gt(L::ZERO).bitselect(rub, -rub);
     let mut found = fixed;
     found.goal = rubbed;
@@ -104,14 +116,14 @@ pub(super) fn piece<L: Lanes>(
         let soft = PieceLanes { kind, gamma, goal: gamma * (motor.start + rubbed) };
         found = choose(motor.slope.simd_gt(L::ZERO) & !impulse.abs().simd_gt(motor.most), soft, found);
     }
-    let hard = |number: u32, goal: L| PieceLanes { kind: L::splat(number as f32), gamma: L::ZERO, goal };
     found = choose(rub.simd_gt(L::ZERO) & !more.abs().simd_gt(rub), hard(kind::STUCK, L::ZERO), found);
     if has(joint_bits::LIMITED) {
-        let rubs = |velocity: L| velocity.simd_gt(L::ZERO).bitselect(-rub, rub);
         let to_low = ((drive.low - at.coordinate) / step).fast_min(L::ZERO);
         let to_high = ((drive.high - at.coordinate) / step).fast_max(L::ZERO);
-        let low = needed(to_low).simd_gt(motor.impulse(to_low) + rubs(to_low)) & !is(was, kind::HIGH);
-        let high = needed(to_high).simd_lt(motor.impulse(to_high) - rubs(-to_high)) & !is(was, kind::LOW);
+        let rubs = to_low.simd_gt(L::ZERO).bitselect(-rub, rub);
+        let low = at.needed(to_low, free).simd_gt(motor.impulse(to_low) + rubs) & !is(was, kind::HIGH);
+        let rubs = (-to_high).simd_gt(L::ZERO).bitselect(-rub, rub);
+        let high = at.needed(to_high, free).simd_lt(motor.impulse(to_high) - rubs) & !is(was, kind::LOW);
         found = choose(high, hard(kind::HIGH, to_high), found);
         found = choose(low, hard(kind::LOW, to_low), found);
         let off = at.coordinate - drive.low;

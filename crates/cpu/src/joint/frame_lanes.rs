@@ -121,12 +121,13 @@ fn rotation_vector<L: Lanes>(qa: Q<L>, between: Q<L>) -> (M3<L>, V3<L>) {
     let square = turn.dot(turn);
     let far = (L::ONE - half * between.w / sine) / square;
     let share = small.bitselect(n(1.0 / 12.0) + square / n(720.0), far);
-    let column = |unit: Vec3| {
+    let mut axes = M3::default();
+    for (column, unit) in axes.0.iter_mut().zip(Vec3::AXES) {
         let unit = splat(unit);
         let once = turn.cross(unit);
-        qa.rotate(unit + n(0.5) * once + share * turn.cross(once))
-    };
-    (M3([column(Vec3::X), column(Vec3::Y), column(Vec3::Z)]), turn)
+        *column = qa.rotate(unit + n(0.5) * once + share * turn.cross(once));
+    }
+    (axes, turn)
 }
 
 /// See [`arc_tangent`](super::frame::arc_tangent).

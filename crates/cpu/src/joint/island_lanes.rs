@@ -2,7 +2,7 @@
 //! take a fraction of the time by it.
 
 use super::island::{CHOICES, CYCLE_REGULARIZATION, HALF, REGULARIZATION, Scene};
-use super::lanes::{M3, Q, masked, select};
+use super::lanes::{M3, Q, is_some, masked, select};
 use super::plan::Plan;
 use super::rows::{STIFFENING, begun, breaks};
 use super::rows_lanes::{BodyLanes, WorkLanes};
@@ -157,12 +157,12 @@ impl<L: Lanes> IslandLanes<L> {
         // SAFETY: islands share no body that moves, and others are not written.
         let read = |i: usize| unsafe { rows.get(i) };
         for (k, body) in self.bodies.iter_mut().enumerate() {
-            let columns = |row: usize| columns::<L>(&read, self.slots[k], row);
-            let [vx, vy, vz, inverse_mass] = columns(0);
-            let [wx, wy, wz, _] = columns(1);
-            let [x, y, z, _] = columns(2);
-            let delta = Q::new(columns(3));
-            let [[xx, yy, zz, _], [xy, xz, yz, _]] = [columns(4), columns(5)];
+            let index = self.slots[k];
+            let [vx, vy, vz, inverse_mass] = columns::<L>(&read, index, 0);
+            let [wx, wy, wz, _] = columns::<L>(&read, index, 1);
+            let [x, y, z, _] = columns::<L>(&read, index, 2);
+            let delta = Q::new(columns::<L>(&read, index, 3));
+            let ([xx, yy, zz, _], [xy, xz, yz, _]) = (columns::<L>(&read, index, 4), columns::<L>(&read, index, 5));
             body.linear = V3::new(vx, vy, vz);
             body.angular = V3::new(wx, wy, wz);
             body.inverse_mass = inverse_mass;
@@ -178,47 +178,37 @@ impl<L: Lanes> IslandLanes<L> {
         // SAFETY: islands share no body that moves, and others are not written.
         let read = |i: usize| unsafe { rows.get(i) };
         for (k, body) in self.bodies[..self.plan.moved()].iter().enumerate() {
-            let columns = |row: usize| columns::<L>(&read, self.slots[k], row);
+            let index = self.slots[k];
             let writes = self.runs & body.inverse_mass.simd_gt(L::ZERO);
-            let put = |row: usize, columns: [L; 4]| {
-                let all = L::rows(columns);
-                for (lane, &slot) in self.slots[k].as_ref().iter().enumerate() {
-                    if writes.as_array()[lane].to_bits() != 0 {
-                        // SAFETY: as above.
-                        unsafe { rows.set(ROWS * slot as usize + row, all.as_ref()[lane]) };
-                    }
-                }
-            };
-            let [vx, vy, vz, _] = columns(0);
-            let [wx, wy, wz, touched] = columns(1);
-            let [lx, ly, lz, weight] = columns(START);
-            let [ax, ay, az, weighted] = columns(START + 1);
+            let [vx, vy, vz, _] = columns::<L>(&read, index, 0);
+            let [wx, wy, wz, touched] = columns::<L>(&read, index, 1);
+            let [lx, ly, lz, weight] = columns::<L>(&read, index, START);
+            let [ax, ay, az, weighted] = columns::<L>(&read, index, START + 1);
             let linear = V3::new(lx, ly, lz) + (body.linear - V3::new(vx, vy, vz));
             let mut angular = V3::new(ax, ay, az) + (body.angular - V3::new(wx, wy, wz));
             let (v, w) = (body.linear, body.angular);
             if moves {
-                put(0, [v.x, v.y, v.z, body.inverse_mass]);
-                put(1, [w.x, w.y, w.z, touched]);
-                put(START, [linear.x, linear.y, linear.z, weight]);
+                put(rows, index, writes, 0, [v.x, v.y, v.z, body.inverse_mass]);
+                put(rows, index, writes, 1, [w.x, w.y, w.z, touched]);
+                put(rows, index, writes, START, [linear.x, linear.y, linear.z, weight]);
             }
             if inertia {
-                let ([xx, yy, zz, level], [xy, xz, yz, parts]) = (columns(4), columns(5));
+                let ([xx, yy, zz, level], [xy, xz, yz, parts]) = (columns::<L>(&read, index, 4), columns::<L>(&read, index, 5));
                 let before = M3::symmetric(V3::new(xx, yy, zz), V3::new(xy, xz, yz));
                 let carried = w - angular;
-                let any = !(carried.x.simd_eq(L::ZERO) & carried.y.simd_eq(L::ZERO) & carried.z.simd_eq(L::ZERO));
                 let turned = w - body.inverse_inertia.times(before.inverse().times(carried));
-                angular = select(before.determinant().simd_gt(L::ZERO) & any, turned, angular);
+                angular = select(before.determinant().simd_gt(L::ZERO) & is_some(carried), turned, angular);
                 let [x, y, z] = body.inverse_inertia.0;
-                put(4, [x.x, y.y, z.z, level]);
-                put(5, [x.y, x.z, y.z, parts]);
+                put(rows, index, writes, 4, [x.x, y.y, z.z, level]);
+                put(rows, index, writes, 5, [x.y, x.z, y.z, parts]);
             }
-            put(START + 1, [angular.x, angular.y, angular.z, weighted]);
+            put(rows, index, writes, START + 1, [angular.x, angular.y, angular.z, weighted]);
             if poses {
-                let [.., eigenvalue] = columns(2);
+                let [.., eigenvalue] = columns::<L>(&read, index, 2);
                 let at = body.pose.translation;
-                put(2, [at.x, at.y, at.z, eigenvalue]);
+                put(rows, index, writes, 2, [at.x, at.y, at.z, eigenvalue]);
                 let delta = body.pose.rotation.times(self.made_of[k].0.conjugate()).normalized();
-                put(3, [delta.imaginary.x, delta.imaginary.y, delta.imaginary.z, delta.w]);
+                put(rows, index, writes, 3, [delta.imaginary.x, delta.imaginary.y, delta.imaginary.z, delta.w]);
             }
         }
     }
@@ -228,11 +218,12 @@ impl<L: Lanes> IslandLanes<L> {
         self.read(rows);
         self.stiffen(step.h);
         for (index, work) in self.works.iter_mut().enumerate() {
-            let [a, b] = self.plan.ends[index].map(|body| self.bodies[body]);
-            work.refresh(&a, &b);
+            let [a, b] = self.plan.ends[index];
+            let [a, b] = [&self.bodies[a], &self.bodies[b]];
+            work.refresh(a, b);
             work.carry_impulses(HALF);
-            work.choose(&a, &b, step.h, HALF);
-            work.rebuild(&a, &b);
+            work.choose(a, b, step.h, HALF);
+            work.rebuild(a, b);
         }
         self.factor();
         self.write(rows, false, true, false);
@@ -243,18 +234,20 @@ impl<L: Lanes> IslandLanes<L> {
         self.read(rows);
         let mut changed = L::ZERO;
         for (index, work) in self.works.iter_mut().enumerate() {
-            let [a, b] = self.plan.ends[index].map(|body| self.bodies[body]);
-            work.look(&a, &b);
-            changed = changed | work.choose(&a, &b, step.h, HALF);
+            let [a, b] = self.plan.ends[index];
+            let [a, b] = [&self.bodies[a], &self.bodies[b]];
+            work.look(a, b);
+            changed = changed | work.choose(a, b, step.h, HALF);
             work.forget_impulses();
-            self.remainders[index] = work.remainders(&a, &b, step.h);
+            self.remainders[index] = work.remainders(a, b, step.h);
         }
         let mut goes_on = self.runs;
         for choice in 0..CHOICES {
             if (changed & goes_on).any() {
                 for (index, work) in self.works.iter_mut().enumerate() {
-                    let [a, b] = self.plan.ends[index].map(|body| self.bodies[body]);
-                    work.rebuild(&a, &b);
+                    let [a, b] = self.plan.ends[index];
+            let [a, b] = [&self.bodies[a], &self.bodies[b]];
+                    work.rebuild(a, b);
                 }
                 // In lanes where nothing changed, it gives what was there.
                 self.factor();
@@ -264,8 +257,9 @@ impl<L: Lanes> IslandLanes<L> {
             changed = L::ZERO;
             if choice + 1 < CHOICES {
                 for (index, work) in self.works.iter_mut().enumerate() {
-                    let [a, b] = self.plan.ends[index].map(|body| self.bodies[body]);
-                    changed = changed | work.choose(&a, &b, step.h, HALF);
+                    let [a, b] = self.plan.ends[index];
+            let [a, b] = [&self.bodies[a], &self.bodies[b]];
+                    changed = changed | work.choose(a, b, step.h, HALF);
                 }
             }
             goes_on = goes_on & changed;
@@ -285,8 +279,9 @@ impl<L: Lanes> IslandLanes<L> {
         }
         self.stiffen(step.h);
         for (index, work) in self.works.iter_mut().enumerate() {
-            let [a, b] = self.plan.ends[index].map(|body| self.bodies[body]);
-            work.refresh(&a, &b);
+            let [a, b] = self.plan.ends[index];
+            let [a, b] = [&self.bodies[a], &self.bodies[b]];
+            work.refresh(a, b);
         }
         self.factor();
         self.project();
@@ -320,7 +315,8 @@ impl<L: Lanes> IslandLanes<L> {
     fn factor(&mut self) {
         let plan = &*self.plan;
         for (k, block) in plan.blocks.iter().enumerate() {
-            let [a, b] = plan.ends[block.joint].map(|body| &self.bodies[body]);
+            let [a, b] = plan.ends[block.joint];
+            let [a, b] = [&self.bodies[a], &self.bodies[b]];
             let in_cycle = plan.kinds[block.joint][1] & joint_bits::IN_CYCLE != 0;
             let more = if in_cycle { CYCLE_REGULARIZATION } else { REGULARIZATION };
             let own = &self.works[block.joint].blocks[block.which];
@@ -371,7 +367,8 @@ impl<L: Lanes> IslandLanes<L> {
     #[inline(always)]
     fn solve_rows(&mut self, relax: bool, goes_on: L) {
         for (k, block) in self.plan.blocks.iter().enumerate() {
-            let [a, b] = self.plan.ends[block.joint].map(|body| &self.bodies[body]);
+            let [a, b] = self.plan.ends[block.joint];
+            let [a, b] = [&self.bodies[a], &self.bodies[b]];
             let lack = self.works[block.joint].lack(block.which, a, b, relax);
             self.values[k] = if relax { lack } else { lack - self.remainders[block.joint][block.which] };
         }
@@ -425,6 +422,18 @@ impl<L: Lanes> IslandLanes<L> {
     }
 }
 
+/// Puts a row of bodies back in the lanes that are set.
+#[inline(always)]
+fn put<L: Lanes>(rows: &Shared<'_, f32x4>, index: L::Indices, writes: L, row: usize, columns: [L; 4]) {
+    let all = L::rows(columns);
+    for (lane, &slot) in index.as_ref().iter().enumerate() {
+        if writes.as_array()[lane].to_bits() != 0 {
+            // SAFETY: islands share no body that moves.
+            unsafe { rows.set(ROWS * slot as usize + row, all.as_ref()[lane]) };
+        }
+    }
+}
+
 /// See [`stiffening`](super::rows::stiffening).
 #[inline(always)]
 fn stiffening<L: Lanes>(arm: V3<L>, impulse: V3<L>, h: f32) -> M3<L> {
@@ -432,18 +441,18 @@ fn stiffening<L: Lanes>(arm: V3<L>, impulse: V3<L>, h: f32) -> M3<L> {
     let pulls = pull.simd_gt(L::ZERO) & square.simd_gt(L::ZERO);
     let outer = M3([arm.x * arm, arm.y * arm, arm.z * arm]).scaled(L::ONE / square);
     let stiff = M3::identity().minus(outer).scaled(L::splat(STIFFENING * h) * pull);
-    M3(stiff.0.map(|column| masked(pulls, column)))
+    let [x, y, z] = stiff.0;
+    M3([masked(pulls, x), masked(pulls, y), masked(pulls, z)])
 }
 
 /// See [`inverse_inertia`](super::rows::inverse_inertia).
 #[inline(always)]
 fn inverse_inertia<L: Lanes>(r: &M3<L>, [inertia, inverse]: &[V3<L>; 2], more: M3<L>) -> M3<L> {
-    let around = |d: &V3<L>| r.matrix(M3::diagonal(*d)).matrix(r.transpose());
-    let plain = around(inverse);
-    let stiff = around(inertia).plus(more).inverse();
+    let plain = r.matrix(M3::diagonal(*inverse)).matrix(r.transpose());
+    let stiff = r.matrix(M3::diagonal(*inertia)).matrix(r.transpose()).plus(more).inverse();
     let [a, b, c] = more.0;
-    let is_stiff = |v: V3<L>| !(v.x.simd_eq(L::ZERO) & v.y.simd_eq(L::ZERO) & v.z.simd_eq(L::ZERO));
-    let mask = (is_stiff(a) | is_stiff(b) | is_stiff(c)) & is_stiff(*inverse);
-    let [x, y, z] = [0, 1, 2].map(|column| select(mask, stiff.0[column], plain.0[column]));
+    let is_stiff = (is_some(a) | is_some(b) | is_some(c)) & is_some(*inverse);
+    let ([a, b, c], [d, e, f]) = (stiff.0, plain.0);
+    let [x, y, z] = [select(is_stiff, a, d), select(is_stiff, b, e), select(is_stiff, c, f)];
     M3::symmetric(V3::new(x.x, y.y, z.z), V3::new(x.y, x.z, y.z))
 }

@@ -25,6 +25,12 @@ pub(super) fn splat<L: Lanes>(v: glam::Vec3) -> V3<L> {
     V3::new(L::splat(v.x), L::splat(v.y), L::splat(v.z))
 }
 
+/// The lanes that are not zero.
+#[inline(always)]
+pub(super) fn is_some<L: Lanes>(v: V3<L>) -> L {
+    !(v.x.simd_eq(L::ZERO) & v.y.simd_eq(L::ZERO) & v.z.simd_eq(L::ZERO))
+}
+
 #[inline(always)]
 pub(super) fn length<L: Lanes>(v: V3<L>) -> L {
     v.dot(v).sqrt()
@@ -57,7 +63,7 @@ pub(super) struct M3<L>(pub(super) [V3<L>; 3]);
 impl<L: Lanes> M3<L> {
     #[inline(always)]
     pub(super) fn identity() -> Self {
-        Self(glam::Vec3::AXES.map(splat))
+        Self::diagonal(splat(glam::Vec3::ONE))
     }
     #[inline(always)]
     pub(super) fn diagonal(v: V3<L>) -> Self {

@@ -4,7 +4,7 @@ use super::drive::kind;
 use super::drive_lanes::{AxisLanes, DriveLanes, PieceLanes, Softness, is, piece};
 use super::frame::used;
 use super::frame_lanes::{Anchors, FrameLanes, PoseLanes, frame};
-use super::lanes::{M3, Q, at, length, masked, put};
+use super::lanes::{M3, Q, at, is_some, length, masked, put};
 use super::rows::{JUMP, KAPPA, LEAST, MAX_PROJECTION, SAME_SPRING, THETA};
 use crate::solver::simd::{Lanes, V3};
 use tumble_core::layout::{Joint, JointState, joint_bits};
@@ -91,7 +91,8 @@ impl<L: Lanes> BlockLanes<L> {
 
     #[inline(always)]
     pub(super) fn diagonal(&self, which: usize, a: &BodyLanes<L>, b: &BodyLanes<L>, regularization: f32) -> M3<L> {
-        let [turned_a, turned_b] = [0, 1].map(|end| self.turn(which, end).back_matrix(self.responses[end]));
+        let turned_a = self.turn(which, 0).back_matrix(self.responses[0]);
+        let turned_b = self.turn(which, 1).back_matrix(self.responses[1]);
         let mut k = if which == 0 {
             let along = self.axes.back_matrix(self.axes).scaled(a.inverse_mass + b.inverse_mass);
             along.plus(turned_a).plus(turned_b)
@@ -214,7 +215,8 @@ impl<L: Lanes> WorkLanes<L> {
                     continue;
                 }
                 let axis = self.frame.axes[which].0[row];
-                let turns = if which == 0 { self.frame.arms.map(|arm| arm.cross(axis)) } else { [axis, axis] };
+                let [arm_a, arm_b] = self.frame.arms;
+                let turns = if which == 0 { [arm_a.cross(axis), arm_b.cross(axis)] } else { [axis, axis] };
                 let responses = [a.inverse_inertia.times(turns[0]), b.inverse_inertia.times(turns[1])];
                 let turned = [turns[0].dot(responses[0]), turns[1].dot(responses[1])];
                 let own =
@@ -295,10 +297,8 @@ impl<L: Lanes> WorkLanes<L> {
     /// Whether any row of a fixed impulse gives something.
     #[inline(always)]
     pub(super) fn fixes(&self) -> bool {
-        self.blocks.iter().any(|block| {
-            let push = block.push;
-            (!(push.x.simd_eq(L::ZERO) & push.y.simd_eq(L::ZERO) & push.z.simd_eq(L::ZERO))).any()
-        })
+        let [along, about] = [self.blocks[0].push, self.blocks[1].push];
+        (is_some(along) | is_some(about)).any()
     }
 
     #[inline(always)]
@@ -402,14 +402,16 @@ impl<L: Lanes> WorkLanes<L> {
 
     #[inline(always)]
     pub(super) fn off_by(&self) -> [L; 2] {
-        [0, 1].map(|which| {
+        let mut lengths = [L::ZERO; 2];
+        for which in 0..2 {
             let mut off = V3::default();
             for row in 0..3 {
                 let locked = is(self.blocks[which].pieces[row].kind, kind::LOCKED);
                 put(&mut off, row, locked & self.beyond(which, row, self.drives[3 * which + row].low));
             }
-            length(off)
-        })
+            lengths[which] = length(off);
+        }
+        lengths
     }
 
     #[inline(always)]
