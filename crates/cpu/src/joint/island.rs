@@ -8,7 +8,7 @@
 use super::plan::{Plan, PlanEntry};
 use super::rows::{Body, Work, inverse_inertia, own_arm, stiffening};
 use crate::math::{quat, vec3};
-use glam::{Mat3, Vec3};
+use glam::{Mat3, Mat3A, Vec3, Vec3A};
 use std::sync::Arc;
 use tumble_core::JointSet;
 use tumble_core::layout::{BodyProps, BodyState, JointIsland, JointState, SolverBody, StepParams, joint_bits};
@@ -31,13 +31,14 @@ pub struct Island {
     bodies: Vec<Body>,
     /// Slots of the bodies: first those that joints move, then others that they hold.
     slots: Vec<u32>,
-    diagonal: Vec<Mat3>,
-    /// L times D below the diagonal.
-    upper: Vec<Mat3>,
+    /// Inverted.
+    diagonal: Vec<Mat3A>,
+    /// L times D below the diagonal, transposed.
+    upper: Vec<Mat3A>,
     /// L below the diagonal.
-    lower: Vec<Mat3>,
+    lower: Vec<Mat3A>,
     /// Right-hand sides and solutions.
-    values: Vec<Vec3>,
+    values: Vec<Vec3A>,
     /// What predictions of the separations are off by.
     remainders: Vec<[Vec3; 2]>,
 }
@@ -215,22 +216,22 @@ impl Island {
     /// Assembles and factors K: level by level, each block of a level by itself.
     fn factor(&mut self, scene: &Scene<'_>) {
         let plan = Arc::clone(&self.plan);
-        self.diagonal.resize(plan.blocks.len(), Mat3::ZERO);
-        self.upper.resize(plan.entries.len(), Mat3::ZERO);
-        self.lower.resize(plan.entries.len(), Mat3::ZERO);
+        self.diagonal.resize(plan.blocks.len(), Mat3A::ZERO);
+        self.upper.resize(plan.entries.len(), Mat3A::ZERO);
+        self.lower.resize(plan.entries.len(), Mat3A::ZERO);
         for (k, block) in plan.blocks.iter().enumerate() {
-            let mut diagonal = self.diagonal_of(scene, block.joint, block.which);
+            let mut diagonal = Mat3A::from(self.diagonal_of(scene, block.joint, block.which));
             for &[row, column] in &plan.terms[block.terms.clone()] {
-                diagonal -= self.lower[row] * self.upper[column].transpose();
+                diagonal -= self.lower[row] * self.upper[column];
             }
             self.diagonal[k] = diagonal.inverse();
             for index in block.entries.clone() {
                 let entry = &plan.entries[index];
-                let mut value = self.entry_of(entry);
+                let mut value = Mat3A::from(self.entry_of(entry));
                 for &[row, column] in &plan.terms[entry.terms.clone()] {
-                    value -= self.lower[row] * self.upper[column].transpose();
+                    value -= self.lower[row] * self.upper[column];
                 }
-                self.upper[index] = value;
+                self.upper[index] = value.transpose();
                 self.lower[index] = value * self.diagonal[k];
             }
         }
@@ -246,17 +247,18 @@ impl Island {
 
     /// What impulses of the column's rows do to the velocities of the row's, by the bodies that both joints hold.
     fn entry_of(&self, entry: &PlanEntry) -> Mat3 {
-        let [row, column] = [entry.row, entry.column].map(|block| {
-            let block = &self.plan.blocks[block];
-            &self.works[block.joint].blocks[block.which]
-        });
+        let places = [&self.plan.blocks[entry.row], &self.plan.blocks[entry.column]];
+        let [row, column] = places.map(|place| &self.works[place.joint].blocks[place.which]);
         let mut value = Mat3::ZERO;
         for shared in &entry.shared {
             let turn = if shared.second[0] { row.turn_b } else { row.turn_a };
             let response = if shared.second[1] { column.response_b } else { column.response_a };
             let sign = if shared.second[0] == shared.second[1] { 1.0 } else { -1.0 };
-            let along = row.along.transpose() * column.along * self.bodies[shared.body].inverse_mass;
-            value += (along + turn.transpose() * response) * sign;
+            let mut one = turn.transpose() * response;
+            if places.iter().all(|place| place.which == 0) {
+                one = row.along.transpose() * column.along * self.bodies[shared.body].inverse_mass + one;
+            }
+            value += one * sign;
         }
         value
     }
@@ -266,8 +268,8 @@ impl Island {
         self.substitute(wanted);
         for (block, &value) in self.plan.blocks.iter().zip(&self.values) {
             let block = &mut self.works[block.joint].blocks[block.which];
-            block.push = value;
-            block.impulse += value;
+            block.push = value.into();
+            block.impulse += block.push;
         }
         self.push(Work::push);
     }
@@ -286,7 +288,7 @@ impl Island {
         let mut values = std::mem::take(&mut self.values);
         values.clear();
         for block in &self.plan.blocks {
-            let mut value = wanted(self, block.joint, block.which);
+            let mut value = Vec3A::from(wanted(self, block.joint, block.which));
             for &[entry, column] in &self.plan.rows[block.rows.clone()] {
                 value -= self.lower[entry] * values[column];
             }
@@ -309,7 +311,7 @@ impl Island {
             -work.off(&scene.set.joints[work.slot as usize], which)
         });
         for (block, &value) in self.plan.blocks.iter().zip(&self.values) {
-            self.works[block.joint].blocks[block.which].push = value;
+            self.works[block.joint].blocks[block.which].push = value.into();
         }
         for (index, body) in self.bodies[..self.plan.moved()].iter_mut().enumerate() {
             if body.inverse_mass > 0.0 {
