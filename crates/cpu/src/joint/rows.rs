@@ -107,7 +107,7 @@ fn inverse_inertia_of(body: &SolverBody) -> Mat3 {
 }
 
 /// Up to three rows.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct Block {
     /// Directions of the impulses along; zero for rows about, and for those not active.
     pub along: Mat3,
@@ -127,6 +127,23 @@ pub struct Block {
     pub own: Vec3,
     /// Pieces of the three rows.
     pub pieces: [Piece; 3],
+}
+
+impl Default for Block {
+    /// Nothing; by default matrices would be one.
+    fn default() -> Self {
+        Self {
+            along: Mat3::ZERO,
+            turn_a: Mat3::ZERO,
+            turn_b: Mat3::ZERO,
+            response_a: Mat3::ZERO,
+            response_b: Mat3::ZERO,
+            impulse: Vec3::ZERO,
+            push: Vec3::ZERO,
+            own: Vec3::ZERO,
+            pieces: [Piece::default(); 3],
+        }
+    }
 }
 
 impl Default for Piece {
