@@ -193,7 +193,8 @@ impl<L: Lanes> IslandLanes<L> {
                 put(rows, index, writes, START, [linear.x, linear.y, linear.z, weight]);
             }
             if inertia {
-                let ([xx, yy, zz, level], [xy, xz, yz, parts]) = (columns::<L>(&read, index, 4), columns::<L>(&read, index, 5));
+                let ([xx, yy, zz, level], [xy, xz, yz, parts]) =
+                    (columns::<L>(&read, index, 4), columns::<L>(&read, index, 5));
                 let before = M3::symmetric(V3::new(xx, yy, zz), V3::new(xy, xz, yz));
                 let carried = w - angular;
                 let turned = w - body.inverse_inertia.times(before.inverse().times(carried));
@@ -246,7 +247,7 @@ impl<L: Lanes> IslandLanes<L> {
             if (changed & goes_on).any() {
                 for (index, work) in self.works.iter_mut().enumerate() {
                     let [a, b] = self.plan.ends[index];
-            let [a, b] = [&self.bodies[a], &self.bodies[b]];
+                    let [a, b] = [&self.bodies[a], &self.bodies[b]];
                     work.rebuild(a, b);
                 }
                 // In lanes where nothing changed, it gives what was there.
@@ -258,7 +259,7 @@ impl<L: Lanes> IslandLanes<L> {
             if choice + 1 < CHOICES {
                 for (index, work) in self.works.iter_mut().enumerate() {
                     let [a, b] = self.plan.ends[index];
-            let [a, b] = [&self.bodies[a], &self.bodies[b]];
+                    let [a, b] = [&self.bodies[a], &self.bodies[b]];
                     changed = changed | work.choose(a, b, step.h, HALF);
                 }
             }

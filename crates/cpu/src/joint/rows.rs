@@ -191,13 +191,11 @@ impl Block {
 }
 
 impl Work {
-    /// A joint at the beginning of a step with sub-steps of length `h`.
+    /// A joint at the beginning of a step with sub-steps of length `h`; it is yet to be refreshed.
     pub fn new(slot: u32, joint: &Joint, state: JointState, between: Vec3, h: f32) -> Self {
         let state = begun(joint, state, h);
         let axes = if state.broken != 0 { 0 } else { joint.axes };
-        let still = Pose { translation: Vec3::ZERO, rotation: Quat::IDENTITY };
-        let blocks = [Block::default(); 2];
-        Self { slot, axes, state, between, frame: frame(joint, &still, &still, between), blocks }
+        Self { slot, axes, state, between, frame: Frame::NONE, blocks: [Block::default(); 2] }
     }
 
     /// A share of the impulses of the last sub-step, in the axes as they are now.

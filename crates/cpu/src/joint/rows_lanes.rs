@@ -246,8 +246,7 @@ impl<L: Lanes> WorkLanes<L> {
             let (which, row) = (axis / 3, axis % 3);
             let was = self.blocks[which].pieces[row];
             let moved = self.moved(which, row, a, b);
-            let mut new =
-                piece(self.kind, axis, (&self.drives[axis], &self.softness), &moved, [h, share], was.kind);
+            let mut new = piece(self.kind, axis, (&self.drives[axis], &self.softness), &moved, [h, share], was.kind);
             let differs = (was.gamma - new.gamma).abs().simd_gt(L::splat(SAME_SPRING) * was.gamma);
             new.gamma = (was.kind.simd_eq(new.kind) & !differs).bitselect(was.gamma, new.gamma);
             changed = changed | !was.kind.simd_eq(new.kind) | !was.gamma.simd_eq(new.gamma);
@@ -385,8 +384,8 @@ impl<L: Lanes> WorkLanes<L> {
             let drive = &self.drives[3 * which + row];
             let kind = self.blocks[which].pieces[row].kind;
             let (from_low, from_high) = (self.beyond(which, row, drive.low), self.beyond(which, row, drive.high));
-            let mut limited = is(kind, kind::LOW) & from_low.fast_min(L::ZERO)
-                | is(kind, kind::HIGH) & from_high.fast_max(L::ZERO);
+            let mut limited =
+                is(kind, kind::LOW) & from_low.fast_min(L::ZERO) | is(kind, kind::HIGH) & from_high.fast_max(L::ZERO);
             if which == 1 {
                 limited = !limited.abs().simd_gt(L::splat(JUMP)) & limited;
             }
