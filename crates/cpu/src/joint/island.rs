@@ -5,6 +5,7 @@
 //! inertia includes the geometric stiffness of all joints of a body: a force held at its old arm makes a light body stiff,
 //! and no exact solver survives that.
 
+use super::frame::Pose;
 use super::plan::{Plan, PlanEntry};
 use super::rows::{Body, Work, inverse_inertia, own_arm, stiffening};
 use crate::math::{quat, vec3};
@@ -39,6 +40,8 @@ pub struct Island {
     lower: Vec<Mat3A>,
     /// Right-hand sides and solutions.
     values: Vec<Vec3A>,
+    /// Where bodies will be.
+    next: Vec<Pose>,
     /// What predictions of the separations are off by.
     remainders: Vec<[Vec3; 2]>,
 }
@@ -119,12 +122,15 @@ impl Island {
         self.read(scene, bodies);
         let mut changed = false;
         self.remainders.clear();
+        self.next.clear();
+        self.next.extend(self.bodies.iter().map(|body| body.predicted(step.h)));
         for (work, &[a, b]) in self.works.iter_mut().zip(&self.plan.ends) {
+            let next = [&self.next[a], &self.next[b]];
             let (joint, a, b) = (&scene.set.joints[work.slot as usize], &self.bodies[a], &self.bodies[b]);
             work.look(joint, a, b);
             changed |= work.choose(joint, a, b, step.h, HALF);
             work.forget_impulses();
-            self.remainders.push(work.remainders(joint, a, b, step.h));
+            self.remainders.push(work.remainders(joint, [a, b], next, step.h));
         }
         for choice in 0..CHOICES {
             if changed {

@@ -1,6 +1,7 @@
 //! Islands of one plan side by side: `island` in lanes, bit for bit. Heaps of figures, fleets of cars and rows of bridges
 //! take a fraction of the time by it.
 
+use super::frame_lanes::PoseLanes;
 use super::island::{CHOICES, CYCLE_REGULARIZATION, HALF, REGULARIZATION, Scene};
 use super::lanes::{M3, Q, is_some, masked, select};
 use super::plan::Plan;
@@ -32,6 +33,7 @@ pub(super) struct IslandLanes<L: Lanes> {
     upper: Vec<M3<L>>,
     lower: Vec<M3<L>>,
     values: Vec<V3<L>>,
+    next: Vec<PoseLanes<L>>,
     remainders: Vec<[V3<L>; 2]>,
     /// The lanes that are solved at the level of sub-steps that runs.
     runs: L,
@@ -123,6 +125,7 @@ impl<L: Lanes> IslandLanes<L> {
             upper: vec![M3::default(); plan.entries.len()],
             lower: vec![M3::default(); plan.entries.len()],
             values: vec![V3::default(); plan.blocks.len()],
+            next: vec![PoseLanes::default(); count],
             remainders: vec![Default::default(); plan.kinds.len()],
             runs: L::ZERO,
             plan: Arc::clone(plan),
@@ -233,14 +236,18 @@ impl<L: Lanes> IslandLanes<L> {
     #[inline(always)]
     fn solve(&mut self, rows: &Shared<'_, f32x4>, step: &StepParams) {
         self.read(rows);
+        for (next, body) in self.next.iter_mut().zip(&self.bodies) {
+            *next = body.predicted(step.h);
+        }
         let mut changed = L::ZERO;
         for (index, work) in self.works.iter_mut().enumerate() {
             let [a, b] = self.plan.ends[index];
+            let next = [&self.next[a], &self.next[b]];
             let [a, b] = [&self.bodies[a], &self.bodies[b]];
             work.look(a, b);
             changed = changed | work.choose(a, b, step.h, HALF);
             work.forget_impulses();
-            self.remainders[index] = work.remainders(a, b, step.h);
+            self.remainders[index] = work.remainders([a, b], next, step.h);
         }
         let mut goes_on = self.runs;
         for choice in 0..CHOICES {

@@ -89,7 +89,7 @@ impl Body {
     }
 
     /// Where it is after h, as far as its velocities tell.
-    fn predicted(&self, h: f32) -> Pose {
+    pub fn predicted(&self, h: f32) -> Pose {
         let half = 0.5 * h * self.angular;
         let turn = Quat::from_xyzw(half.x, half.y, half.z, 1.0).normalize();
         // A turn by the tangent of half the angle is too short by a twelfth of the cube; this is the next order.
@@ -363,9 +363,9 @@ impl Work {
     }
 
     /// By how much the separation of the locked rows will be off what is linear, as far as it is to be believed: spins
-    /// make it wrong, unless it is as it was in the last sub-step.
-    pub fn remainders(&mut self, joint: &Joint, a: &Body, b: &Body, h: f32) -> [Vec3; 2] {
-        let next = frame(joint, &a.predicted(h), &b.predicted(h), self.between);
+    /// make it wrong, unless it is as it was in the last sub-step. `next` is where the bodies will be.
+    pub fn remainders(&mut self, joint: &Joint, [a, b]: [&Body; 2], next: [&Pose; 2], h: f32) -> [Vec3; 2] {
+        let next = frame(joint, next[0], next[1], self.between);
         let now = self.frame;
         let spin = h * a.angular.length().max(b.angular.length()) / THETA;
         let still = 1.0 / (1.0 + spin * spin * spin * spin);

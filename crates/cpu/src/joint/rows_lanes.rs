@@ -64,7 +64,8 @@ impl<L: Lanes> PoseLanes<L> {
 
 impl<L: Lanes> BodyLanes<L> {
     #[inline(always)]
-    fn predicted(&self, h: L) -> PoseLanes<L> {
+    pub(super) fn predicted(&self, h: f32) -> PoseLanes<L> {
+        let h = L::splat(h);
         let half = (L::splat(0.5) * h) * self.angular;
         let square = half.dot(half);
         let near = square.simd_lt(L::ONE);
@@ -343,9 +344,9 @@ impl<L: Lanes> WorkLanes<L> {
     }
 
     #[inline(always)]
-    pub(super) fn remainders(&mut self, a: &BodyLanes<L>, b: &BodyLanes<L>, h: f32) -> [V3<L>; 2] {
+    pub(super) fn remainders(&mut self, [a, b]: [&BodyLanes<L>; 2], next: [&PoseLanes<L>; 2], h: f32) -> [V3<L>; 2] {
         let n = L::splat;
-        let next = frame(self.kind, &self.anchors, &a.predicted(n(h)), &b.predicted(n(h))).coordinates;
+        let next = frame(self.kind, &self.anchors, next[0], next[1]).coordinates;
         let now = self.frame.coordinates;
         let spin = n(h) * length(a.angular).fast_max(length(b.angular)) / n(THETA);
         let still = L::ONE / (L::ONE + spin * spin * spin * spin);
