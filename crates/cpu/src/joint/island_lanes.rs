@@ -3,12 +3,12 @@
 
 use super::frame_lanes::PoseLanes;
 use super::island::{CHOICES, CYCLE_REGULARIZATION, HALF, REGULARIZATION, Scene};
-use super::lanes::{M3, Q, is_some, masked, select};
+use super::lanes::{M3, Q, inverse_inertia, is_some, masked, select, stiffening};
 use super::plan::Plan;
-use super::rows::{STIFFENING, begun, breaks};
+use super::rows::breaks;
 use super::rows_lanes::{BodyLanes, WorkLanes};
 use super::units::Unit;
-use super::{Part, level_of};
+use super::{Part, begun, level_of};
 use crate::math::vec3;
 use crate::shared::Shared;
 use crate::solver::lanes::{ROWS, START, columns};
@@ -440,27 +440,4 @@ fn put<L: Lanes>(rows: &Shared<'_, f32x4>, index: L::Indices, writes: L, row: us
             unsafe { rows.set(ROWS * slot as usize + row, all.as_ref()[lane]) };
         }
     }
-}
-
-/// See [`stiffening`](super::rows::stiffening).
-#[inline(always)]
-fn stiffening<L: Lanes>(arm: V3<L>, impulse: V3<L>, h: f32) -> M3<L> {
-    let (pull, square) = (arm.dot(impulse), arm.dot(arm));
-    let pulls = pull.simd_gt(L::ZERO) & square.simd_gt(L::ZERO);
-    let outer = M3([arm.x * arm, arm.y * arm, arm.z * arm]).scaled(L::ONE / square);
-    let stiff = M3::identity().minus(outer).scaled(L::splat(STIFFENING * h) * pull);
-    let [x, y, z] = stiff.0;
-    M3([masked(pulls, x), masked(pulls, y), masked(pulls, z)])
-}
-
-/// See [`inverse_inertia`](super::rows::inverse_inertia).
-#[inline(always)]
-fn inverse_inertia<L: Lanes>(r: &M3<L>, [inertia, inverse]: &[V3<L>; 2], more: M3<L>) -> M3<L> {
-    let plain = r.matrix(M3::diagonal(*inverse)).matrix(r.transpose());
-    let stiff = r.matrix(M3::diagonal(*inertia)).matrix(r.transpose()).plus(more).inverse();
-    let [a, b, c] = more.0;
-    let is_stiff = (is_some(a) | is_some(b) | is_some(c)) & is_some(*inverse);
-    let ([a, b, c], [d, e, f]) = (stiff.0, plain.0);
-    let [x, y, z] = [select(is_stiff, a, d), select(is_stiff, b, e), select(is_stiff, c, f)];
-    M3::symmetric(V3::new(x.x, y.y, z.z), V3::new(x.y, x.z, y.z))
 }

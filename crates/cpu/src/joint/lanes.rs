@@ -1,6 +1,7 @@
 //! Matrices and rotations of islands side by side, in the order of operations that the plain form has, so that each lane
 //! has its bits.
 
+use super::rows::STIFFENING;
 use crate::solver::simd::{Lanes, V3};
 
 /// The first where the mask is set, elsewhere the second.
@@ -189,4 +190,27 @@ impl<L: Lanes> Q<L> {
             V3::new(xz + wy, yz - wx, L::ONE - (xx + yy)),
         ])
     }
+}
+
+/// See [`stiffening`](super::rows::stiffening).
+#[inline(always)]
+pub(super) fn stiffening<L: Lanes>(arm: V3<L>, impulse: V3<L>, h: f32) -> M3<L> {
+    let (pull, square) = (arm.dot(impulse), arm.dot(arm));
+    let pulls = pull.simd_gt(L::ZERO) & square.simd_gt(L::ZERO);
+    let outer = M3([arm.x * arm, arm.y * arm, arm.z * arm]).scaled(L::ONE / square);
+    let stiff = M3::identity().minus(outer).scaled(L::splat(STIFFENING * h) * pull);
+    let [x, y, z] = stiff.0;
+    M3([masked(pulls, x), masked(pulls, y), masked(pulls, z)])
+}
+
+/// See [`inverse_inertia`](super::rows::inverse_inertia).
+#[inline(always)]
+pub(super) fn inverse_inertia<L: Lanes>(r: &M3<L>, [inertia, inverse]: &[V3<L>; 2], more: M3<L>) -> M3<L> {
+    let plain = r.matrix(M3::diagonal(*inverse)).matrix(r.transpose());
+    let stiff = r.matrix(M3::diagonal(*inertia)).matrix(r.transpose()).plus(more).inverse();
+    let [a, b, c] = more.0;
+    let is_stiff = (is_some(a) | is_some(b) | is_some(c)) & is_some(*inverse);
+    let ([a, b, c], [d, e, f]) = (stiff.0, plain.0);
+    let [x, y, z] = [select(is_stiff, a, d), select(is_stiff, b, e), select(is_stiff, c, f)];
+    M3::symmetric(V3::new(x.x, y.y, z.z), V3::new(x.y, x.z, y.z))
 }

@@ -207,6 +207,20 @@ fn name(control: &mut Control, slot: u32) {
     *place = (*place).max(slot + 1);
 }
 
+/// What a joint begins a step with that has sub-steps of length `h`.
+pub fn begun(joint: &Joint, state: JointState, h: f32) -> JointState {
+    let fresh = JointState { tag: joint.generation + 1, h, ..JointState::zeroed() };
+    let mut state = if state.tag == fresh.tag { state } else { fresh };
+    let scale = if state.h == h || state.h == 0.0 { 1.0 } else { h / state.h };
+    state.impulse = state.impulse.map(|x| scale * x);
+    state.torque = state.torque.map(|x| scale * x);
+    state.h = h;
+    if state.broken != 0 {
+        (state.impulse, state.torque) = ([0.0; 3], [0.0; 3]);
+    }
+    state
+}
+
 /// What is kept of a joint: nothing if it is not finite.
 fn kept(state: JointState) -> JointState {
     if finite(state.impulse) && finite(state.torque) { state } else { JointState::zeroed() }

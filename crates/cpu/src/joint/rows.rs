@@ -4,6 +4,7 @@
 //! is zero. For locked rows the separation is predicted: it must be gone after the sub-step, and what is linear in the
 //! velocities is off by the remainder d, which is taken in where it is small or smooth.
 
+use super::begun;
 use super::drive::{AxisState, Piece, kind, piece};
 use super::frame::{Frame, Pose, frame, used};
 use crate::math::{quat, rotate, vec3};
@@ -106,8 +107,8 @@ fn inverse_inertia_of(body: &SolverBody) -> Mat3 {
     Mat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz])
 }
 
-/// Up to three rows.
-#[derive(Debug, Clone, Copy)]
+/// Up to three rows. Not `Default`: the matrices of glam are one by that.
+#[derive(Debug, Clone, Copy, Zeroable)]
 pub struct Block {
     /// Directions of the impulses along; zero for rows about, and for those not active.
     pub along: Mat3,
@@ -127,29 +128,6 @@ pub struct Block {
     pub own: Vec3,
     /// Pieces of the three rows.
     pub pieces: [Piece; 3],
-}
-
-impl Default for Block {
-    /// Nothing; by default matrices would be one.
-    fn default() -> Self {
-        Self {
-            along: Mat3::ZERO,
-            turn_a: Mat3::ZERO,
-            turn_b: Mat3::ZERO,
-            response_a: Mat3::ZERO,
-            response_b: Mat3::ZERO,
-            impulse: Vec3::ZERO,
-            push: Vec3::ZERO,
-            own: Vec3::ZERO,
-            pieces: [Piece::default(); 3],
-        }
-    }
-}
-
-impl Default for Piece {
-    fn default() -> Self {
-        Self { kind: kind::FIXED, gamma: 0.0, goal: 0.0, off: 0.0 }
-    }
 }
 
 /// A joint in a step.
@@ -195,7 +173,7 @@ impl Work {
     pub fn new(slot: u32, joint: &Joint, state: JointState, between: Vec3, h: f32) -> Self {
         let state = begun(joint, state, h);
         let axes = if state.broken != 0 { 0 } else { joint.axes };
-        Self { slot, axes, state, between, frame: Frame::NONE, blocks: [Block::default(); 2] }
+        Self { slot, axes, state, between, frame: Frame::NONE, blocks: [Block::zeroed(); 2] }
     }
 
     /// A share of the impulses of the last sub-step, in the axes as they are now.
@@ -453,20 +431,6 @@ impl Work {
         self.state.impulse = (vec3(self.state.impulse) + self.frame.along * along.impulse).to_array();
         self.state.torque = (vec3(self.state.torque) + self.frame.about * about.impulse).to_array();
     }
-}
-
-/// What a joint begins a step with that has sub-steps of length `h`.
-pub fn begun(joint: &Joint, state: JointState, h: f32) -> JointState {
-    let fresh = JointState { tag: joint.generation + 1, h, ..JointState::zeroed() };
-    let mut state = if state.tag == fresh.tag { state } else { fresh };
-    let scale = if state.h == h || state.h == 0.0 { 1.0 } else { h / state.h };
-    state.impulse = state.impulse.map(|x| scale * x);
-    state.torque = state.torque.map(|x| scale * x);
-    state.h = h;
-    if state.broken != 0 {
-        (state.impulse, state.torque) = ([0.0; 3], [0.0; 3]);
-    }
-    state
 }
 
 /// Whether the last sub-step asked for more than the joint bears.

@@ -403,13 +403,13 @@ impl<L: Lanes> WorkLanes<L> {
     #[inline(always)]
     pub(super) fn off_by(&self) -> [L; 2] {
         let mut lengths = [L::ZERO; 2];
-        for which in 0..2 {
+        for (which, length_of) in lengths.iter_mut().enumerate() {
             let mut off = V3::default();
             for row in 0..3 {
                 let locked = is(self.blocks[which].pieces[row].kind, kind::LOCKED);
                 put(&mut off, row, locked & self.beyond(which, row, self.drives[3 * which + row].low));
             }
-            lengths[which] = length(off);
+            *length_of = length(off);
         }
         lengths
     }

@@ -170,7 +170,7 @@ mod tests {
         for (name, scene, params, steps) in all {
             let widths = [1, f32x4::COUNT, most_abreast()];
             let mut worlds = widths.map(|abreast| {
-                let mut world = World::new(scene.clone(), params.clone()).unwrap();
+                let mut world = World::new(scene.clone(), params).unwrap();
                 world.joints_mut().abreast = abreast;
                 world
             });
