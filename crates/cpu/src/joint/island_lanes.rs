@@ -156,7 +156,7 @@ impl<L: Lanes> IslandLanes<L> {
     }
 
     #[inline(always)]
-    fn read(&mut self, rows: &Shared<'_, f32x4>) {
+    fn read(&mut self, rows: &Shared<'_, f32x4>, inertia: bool) {
         // SAFETY: islands share no body that moves, and others are not written.
         let read = |i: usize| unsafe { rows.get(i) };
         for (k, body) in self.bodies.iter_mut().enumerate() {
@@ -165,19 +165,21 @@ impl<L: Lanes> IslandLanes<L> {
             let [wx, wy, wz, _] = columns::<L>(&read, index, 1);
             let [x, y, z, _] = columns::<L>(&read, index, 2);
             let delta = Q::new(columns::<L>(&read, index, 3));
-            let ([xx, yy, zz, _], [xy, xz, yz, _]) = (columns::<L>(&read, index, 4), columns::<L>(&read, index, 5));
             body.linear = V3::new(vx, vy, vz);
             body.angular = V3::new(wx, wy, wz);
             body.inverse_mass = inverse_mass;
-            body.inverse_inertia = M3::symmetric(V3::new(xx, yy, zz), V3::new(xy, xz, yz));
+            if inertia {
+                let ([xx, yy, zz, _], [xy, xz, yz, _]) = (columns::<L>(&read, index, 4), columns::<L>(&read, index, 5));
+                body.inverse_inertia = M3::symmetric(V3::new(xx, yy, zz), V3::new(xy, xz, yz));
+            }
             body.pose.translation = V3::new(x, y, z);
             body.pose.rotation = delta.times(self.made_of[k].0).normalized();
         }
     }
 
-    /// Puts bodies back: velocities where `moves` is set, inertia and poses where `turns` is.
+    /// Puts bodies back; inertia and poses where they are relaxed.
     #[inline(always)]
-    fn write(&self, rows: &Shared<'_, f32x4>, moves: bool, inertia: bool, poses: bool) {
+    fn write(&self, rows: &Shared<'_, f32x4>, relaxed: bool) {
         // SAFETY: islands share no body that moves, and others are not written.
         let read = |i: usize| unsafe { rows.get(i) };
         for (k, body) in self.bodies[..self.plan.moved()].iter().enumerate() {
@@ -190,12 +192,10 @@ impl<L: Lanes> IslandLanes<L> {
             let linear = V3::new(lx, ly, lz) + (body.linear - V3::new(vx, vy, vz));
             let mut angular = V3::new(ax, ay, az) + (body.angular - V3::new(wx, wy, wz));
             let (v, w) = (body.linear, body.angular);
-            if moves {
-                put(rows, index, writes, 0, [v.x, v.y, v.z, body.inverse_mass]);
-                put(rows, index, writes, 1, [w.x, w.y, w.z, touched]);
-                put(rows, index, writes, START, [linear.x, linear.y, linear.z, weight]);
-            }
-            if inertia {
+            put(rows, index, writes, 0, [v.x, v.y, v.z, body.inverse_mass]);
+            put(rows, index, writes, 1, [w.x, w.y, w.z, touched]);
+            put(rows, index, writes, START, [linear.x, linear.y, linear.z, weight]);
+            if relaxed {
                 let ([xx, yy, zz, level], [xy, xz, yz, parts]) =
                     (columns::<L>(&read, index, 4), columns::<L>(&read, index, 5));
                 let before = M3::symmetric(V3::new(xx, yy, zz), V3::new(xy, xz, yz));
@@ -207,7 +207,7 @@ impl<L: Lanes> IslandLanes<L> {
                 put(rows, index, writes, 5, [x.y, x.z, y.z, parts]);
             }
             put(rows, index, writes, START + 1, [angular.x, angular.y, angular.z, weighted]);
-            if poses {
+            if relaxed {
                 let [.., eigenvalue] = columns::<L>(&read, index, 2);
                 let at = body.pose.translation;
                 put(rows, index, writes, 2, [at.x, at.y, at.z, eigenvalue]);
@@ -219,7 +219,7 @@ impl<L: Lanes> IslandLanes<L> {
 
     #[inline(always)]
     fn begin(&mut self, rows: &Shared<'_, f32x4>, step: &StepParams) {
-        self.read(rows);
+        self.read(rows, true);
         self.stiffen(step.h);
         for (index, work) in self.works.iter_mut().enumerate() {
             let [a, b] = self.plan.ends[index];
@@ -230,12 +230,11 @@ impl<L: Lanes> IslandLanes<L> {
             work.rebuild(a, b);
         }
         self.factor();
-        self.write(rows, false, true, false);
     }
 
     #[inline(always)]
     fn solve(&mut self, rows: &Shared<'_, f32x4>, step: &StepParams) {
-        self.read(rows);
+        self.read(rows, false);
         for (next, body) in self.next.iter_mut().zip(&self.bodies) {
             *next = body.predicted(step.h);
         }
@@ -275,12 +274,12 @@ impl<L: Lanes> IslandLanes<L> {
                 break;
             }
         }
-        self.write(rows, true, false, false);
+        self.write(rows, false);
     }
 
     #[inline(always)]
     fn relax(&mut self, rows: &Shared<'_, f32x4>, step: &StepParams) {
-        self.read(rows);
+        self.read(rows, false);
         for work in &mut self.works {
             work.keep_impulses();
             work.forget_impulses();
@@ -298,7 +297,7 @@ impl<L: Lanes> IslandLanes<L> {
         for work in &mut self.works {
             work.add_impulses();
         }
-        self.write(rows, true, true, true);
+        self.write(rows, true);
     }
 
     #[inline(always)]
