@@ -231,5 +231,5 @@ pub fn stiffen(
         more += stiffening(arm, if end & 1 == 1 { impulse } else { -impulse }, step.h);
     }
     let stiffened = inverse_inertia(seen.pose.rotation, &scene.props[slot], more);
-    *body = Body { inverse_inertia: stiffened, ..seen }.put_inertia(*body);
+    Body { inverse_inertia: stiffened, ..seen }.put_inertia(body);
 }

@@ -7,11 +7,12 @@
 //! is a semi-smooth Newton method (Hintermüller, Ito and Kunisch, "The primal-dual active set strategy as a semismooth
 //! Newton method", 2002).
 
+use bytemuck::Zeroable;
 use std::f32::consts::TAU;
 use tumble_core::layout::{Joint, JointDrive, joint_bits};
 
 /// A piece of the graph: velocity + `gamma` impulse = `goal` where the row is `active`, else impulse = `goal`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Zeroable)]
 pub struct Piece {
     /// Which piece; the same number means the same rows of the system.
     pub kind: u32,

@@ -37,6 +37,18 @@ pub struct Frame {
     pub turn: Vec3,
 }
 
+impl Frame {
+    /// That of a joint that nobody has looked at.
+    pub const NONE: Self = Self {
+        arm_a: Vec3::ZERO,
+        arm_b: Vec3::ZERO,
+        along: Mat3::ZERO,
+        about: Mat3::ZERO,
+        shift: Vec3::ZERO,
+        turn: Vec3::ZERO,
+    };
+}
+
 /// The joint's frame. `between` leads from where the first body's centre of mass was when the step began to where the
 /// second one's was, m.
 pub fn frame(joint: &Joint, a: &Pose, b: &Pose, between: Vec3) -> Frame {
@@ -56,7 +68,7 @@ pub fn used(axes: u32, which: usize) -> u32 {
 }
 
 /// Shorter distances of the anchors have no direction, m.
-const SHORTEST: f32 = 1e-9;
+pub(super) const SHORTEST: f32 = 1e-9;
 
 fn axes_along(joint: &Joint, qa: Quat, offset: Vec3) -> (Mat3, Vec3) {
     if joint.flags & joint_bits::COUPLED != 0 {

@@ -11,8 +11,8 @@ pub const STIFFENING: f32 = 2.0;
 impl Body {
     /// The solver's body with this inertia. What contacts will add again to its angular velocity is what their torques do
     /// to the new inertia: that of a light body may have changed a hundredfold.
-    pub fn put_inertia(&self, mut body: SolverBody) -> SolverBody {
-        let before = unheld(inverse_inertia_of(&body));
+    pub fn put_inertia(&self, body: &mut SolverBody) {
+        let before = unheld(inverse_inertia_of(body));
         let carried = vec3(body.angular_velocity) - vec3(body.angular_start);
         if before.determinant() > 0.0 && carried != Vec3::ZERO {
             let carried = self.inverse_inertia * (before.inverse() * carried);
@@ -21,7 +21,6 @@ impl Body {
         let i = self.inverse_inertia;
         body.inverse_inertia_diagonal = [i.x_axis.x, i.y_axis.y, i.z_axis.z];
         body.inverse_inertia_off = [i.x_axis.y, i.x_axis.z, i.y_axis.z];
-        body
     }
 }
 
@@ -67,10 +66,14 @@ pub fn inverse_inertia(rotation: Quat, props: &BodyProps, stiffening: Mat3) -> M
         let inertia = r * Mat3::from_diagonal(vec3(props.inertia)) * r.transpose() + stiffening;
         return left(unheld(left(inertia)).inverse());
     }
-    if stiffening == Mat3::ZERO || vec3(props.inverse_inertia) == Vec3::ZERO {
-        return r * Mat3::from_diagonal(vec3(props.inverse_inertia)) * r.transpose();
-    }
-    (r * Mat3::from_diagonal(vec3(props.inertia)) * r.transpose() + stiffening).inverse()
+    let i = if stiffening == Mat3::ZERO || vec3(props.inverse_inertia) == Vec3::ZERO {
+        r * Mat3::from_diagonal(vec3(props.inverse_inertia)) * r.transpose()
+    } else {
+        (r * Mat3::from_diagonal(vec3(props.inertia)) * r.transpose() + stiffening).inverse()
+    };
+    // As it is kept.
+    let (xy, xz, yz) = (i.x_axis.y, i.x_axis.z, i.y_axis.z);
+    Mat3::from_cols_array(&[i.x_axis.x, xy, xz, xy, i.y_axis.y, yz, xz, yz, i.z_axis.z])
 }
 
 /// The arm of a joint at a body, from its centre of mass to its own anchor, m.

@@ -1,7 +1,7 @@
 //! The inertia of the bodies of batches, several at a time: [`stiffen`](super::batches::stiffen).
 
-use super::joined_lanes::{Symmetric, axes, choose, normalized, product, rotate};
 use super::inertia::STIFFENING;
+use super::joined_lanes::{Symmetric, axes, choose, normalized, product, rotate};
 use crate::shared::Shared;
 use crate::solver::lanes::{BodyRows, NO_BODY, Places, START};
 use crate::solver::simd::{Lanes, V3};

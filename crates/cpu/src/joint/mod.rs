@@ -8,32 +8,40 @@
 pub mod batches;
 mod batches_lanes;
 pub mod drive;
+mod drive_lanes;
 pub mod frame;
+mod frame_lanes;
 mod groups;
 pub mod held;
 pub mod inertia;
 mod inertia_lanes;
 pub mod island;
+mod island_lanes;
 mod joined_lanes;
+mod lanes;
 mod loose;
+pub mod plan;
 pub mod rows;
+mod rows_lanes;
 mod turn_lanes;
+mod units;
 
 use crate::bounds::moves;
 use crate::math::finite;
 use crate::shared::Shared;
 use crate::workers::blocks;
 use bytemuck::Zeroable;
-use island::{Island, Scene, Store};
+use island::{Scene, Store};
 use loose::{LooseJoints, RunningLoose};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
-use tumble_core::JointSet;
 use tumble_core::layout::{
     BREAK_NAMES, BodyProps, BodyState, Control, Joint, JointIsland, JointState, SolverBody, StepParams, joint_bits,
     touched,
 };
+use tumble_core::{JointSet, Topology};
+use units::Unit;
 
 /// A part of a sub-step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,20 +65,36 @@ pub enum Part {
 }
 
 /// The joints of a world.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Joints {
     /// What lasts of each joint, by slot.
     pub states: Vec<JointState>,
-    islands: Vec<Mutex<Island>>,
+    units: Vec<Mutex<Box<dyn Unit>>>,
+    /// What the units were made for: the topology, and axes and flags of its joints.
+    made_for: (Arc<Topology>, Vec<[u32; 2]>),
+    /// Most islands that are solved side by side; 1 for all alone, else 4, or 8 where the processor has AVX2.
+    abreast: usize,
     /// Joints of batches.
     loose: LooseJoints,
+}
+
+impl Default for Joints {
+    fn default() -> Self {
+        Self {
+            states: Vec::new(),
+            units: Vec::new(),
+            made_for: Default::default(),
+            abreast: units::most_abreast(),
+            loose: LooseJoints::default(),
+        }
+    }
 }
 
 /// Joints in a step: what all threads see.
 pub struct Running<'a> {
     scene: Scene<'a>,
     states: &'a [JointState],
-    islands: &'a [Mutex<Island>],
+    units: &'a [Mutex<Box<dyn Unit>>],
     loose: RunningLoose<'a>,
 }
 
@@ -96,10 +120,20 @@ impl Joints {
 
     /// Room for the joints of a step.
     pub fn reserve(&mut self, set: &Arc<JointSet>) {
-        let topology = &set.topology;
         self.states.resize(set.joints.len(), JointState::zeroed());
-        self.islands.resize_with(topology.islands.len(), Mutex::default);
+        self.plan(set);
         self.loose.build(set);
+    }
+
+    /// Makes the islands anew where joints came or went, or are of another kind.
+    fn plan(&mut self, set: &JointSet) {
+        let kind = |&slot: &u32| [set.joints[slot as usize].axes, set.joints[slot as usize].flags];
+        let kinds = set.topology.joints[..set.topology.direct_joints() as usize].iter().map(kind);
+        if Arc::ptr_eq(&self.made_for.0, &set.topology) && self.made_for.1.iter().copied().eq(kinds.clone()) {
+            return;
+        }
+        self.made_for = (Arc::clone(&set.topology), kinds.collect());
+        self.units = units::units(set, self.abreast);
     }
 
     /// The passes of a step over these joints.
@@ -112,7 +146,7 @@ impl Joints {
         Running {
             scene: Scene { set, states, props },
             states: &self.states,
-            islands: &self.islands,
+            units: &self.units,
             loose: self.loose.running(),
         }
     }
@@ -126,6 +160,11 @@ impl Joints {
         step: &StepParams,
         control: &mut Control,
     ) {
+        let scene = Scene { set, states, props: &[] };
+        let unit = |unit: &mut Mutex<Box<dyn Unit>>| {
+            unit.get_mut().expect("no thread panicked with it").store(&scene, &self.states, step)
+        };
+        let new: Vec<_> = self.units.iter_mut().flat_map(unit).collect();
         let all = Shared::new(&mut self.states);
         let broke = Mutex::new(Vec::new());
         let keep = |slot: u32, new: JointState| {
@@ -140,14 +179,7 @@ impl Joints {
             }
         };
         self.loose.for_each_lasting(set, &all, states, bodies, step, &keep);
-        for (info, island) in set.topology.islands.iter().zip(&mut self.islands) {
-            if level(set, info, states, |slot| bodies[slot].level) != Some(step.level) {
-                continue;
-            }
-            let island = island.get_mut().expect("no thread panicked with it");
-            let slots = &set.topology.joints[info.first_joint as usize..][..info.joint_count as usize];
-            slots.iter().zip(island.states(set)).for_each(|(&slot, state)| keep(slot, state));
-        }
+        new.into_iter().for_each(|(slot, state)| keep(slot, state));
         broke.into_inner().expect("no thread panicked with it").into_iter().for_each(|slot| name(control, slot));
     }
 
@@ -173,6 +205,20 @@ fn name(control: &mut Control, slot: u32) {
     *place = (*place).max(slot + 1);
 }
 
+/// What a joint begins a step with that has sub-steps of length `h`.
+pub fn begun(joint: &Joint, state: JointState, h: f32) -> JointState {
+    let fresh = JointState { tag: joint.generation + 1, h, ..JointState::zeroed() };
+    let mut state = if state.tag == fresh.tag { state } else { fresh };
+    let scale = if state.h == h || state.h == 0.0 { 1.0 } else { h / state.h };
+    state.impulse = state.impulse.map(|x| scale * x);
+    state.torque = state.torque.map(|x| scale * x);
+    state.h = h;
+    if state.broken != 0 {
+        (state.impulse, state.torque) = ([0.0; 3], [0.0; 3]);
+    }
+    state
+}
+
 /// What is kept of a joint: nothing if it is not finite.
 fn kept(state: JointState) -> JointState {
     if finite(state.impulse) && finite(state.torque) { state } else { JointState::zeroed() }
@@ -183,10 +229,7 @@ impl Running<'_> {
     pub(crate) fn stages(&self, part: Part) -> Vec<(Range<usize>, u32)> {
         let topology = &self.scene.set.topology;
         match part {
-            Part::Begin | Part::Solve | Part::Relax => {
-                let islands = topology.islands.len();
-                vec![(0..islands, blocks(islands, 1))]
-            }
+            Part::Begin | Part::Solve | Part::Relax => vec![(0..self.units.len(), blocks(self.units.len(), 1))],
             _ => self.loose.stages(part, topology.bodies.len() - topology.direct_bodies() as usize),
         }
     }
@@ -195,24 +238,13 @@ impl Running<'_> {
     pub(crate) fn run(&self, part: Part, range: Range<usize>, bodies: &Shared<'_, SolverBody>, step: &StepParams) {
         match part {
             Part::Begin | Part::Solve | Part::Relax => {
-                range.for_each(|index| self.run_island(part, index, bodies, step));
+                for index in range {
+                    let mut unit = self.units[index].lock().expect("no thread panicked with it");
+                    unit.run(part, &self.scene, self.states, bodies, step);
+                }
             }
             Part::Stiffen => self.loose.stiffen(range, &self.scene, bodies, step),
             _ => self.loose.visit(part, range, &self.scene, self.states, bodies, step),
-        }
-    }
-
-    fn run_island(&self, part: Part, index: usize, bodies: &Shared<'_, SolverBody>, step: &StepParams) {
-        let info = &self.scene.set.topology.islands[index];
-        let level = level(self.scene.set, info, self.scene.states, |slot| Store::get(bodies, slot).level);
-        if level != Some(step.level) {
-            return;
-        }
-        let mut island = self.islands[index].lock().expect("no thread panicked with it");
-        match part {
-            Part::Begin => island.begin(&self.scene, info, self.states, bodies, step),
-            Part::Solve => island.solve(&self.scene, bodies, step),
-            _ => island.relax(&self.scene, bodies, step),
         }
     }
 }
@@ -235,8 +267,8 @@ pub fn mark(set: &JointSet, states: &[JointState], bodies: &mut [SolverBody]) {
 
 /// The level of sub-steps of an island that is solved directly, by that of each body; none where all its bodies sleep or
 /// are in quarantine: nothing is solved then, and what its joints remember stays.
-fn level(set: &JointSet, info: &JointIsland, states: &[BodyState], of: impl Fn(usize) -> u32) -> Option<u32> {
-    let bodies = &set.topology.bodies[info.first_body as usize..][..info.body_count as usize];
-    let awake = bodies.iter().map(|body| body.body as usize).find(|&slot| moves(states[slot].flags));
-    awake.map(of)
+fn level_of(scene: &Scene<'_>, info: &JointIsland, solver: &impl Store) -> Option<u32> {
+    let bodies = &scene.set.topology.bodies[info.first_body as usize..][..info.body_count as usize];
+    let awake = bodies.iter().map(|body| body.body as usize).find(|&slot| moves(scene.states[slot].flags));
+    awake.map(|slot| solver.get(slot).level)
 }

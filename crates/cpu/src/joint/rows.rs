@@ -4,6 +4,7 @@
 //! is zero. For locked rows the separation is predicted: it must be gone after the sub-step, and what is linear in the
 //! velocities is off by the remainder d, which is taken in where it is small or smooth.
 
+use super::begun;
 use super::drive::{AxisState, Piece, kind, piece};
 use super::frame::{Frame, Pose, frame, used};
 use super::held::{answer, ghost, pushed};
@@ -88,7 +89,7 @@ impl Body {
     }
 
     /// Where it is after h, as far as its velocities tell.
-    fn predicted(&self, h: f32) -> Pose {
+    pub fn predicted(&self, h: f32) -> Pose {
         let half = 0.5 * h * self.angular;
         let turn = Quat::from_xyzw(half.x, half.y, half.z, 1.0).normalize();
         // A turn by the tangent of half the angle is too short by a twelfth of the cube; this is the next order.
@@ -99,8 +100,8 @@ impl Body {
     }
 }
 
-/// Up to three rows.
-#[derive(Debug, Clone, Copy, Default)]
+/// Up to three rows. Not `Default`: the matrices of glam are one by that.
+#[derive(Debug, Clone, Copy, Zeroable)]
 pub struct Block {
     /// Directions of the impulses along; zero for rows about, and for those not active.
     pub along: Mat3,
@@ -120,12 +121,6 @@ pub struct Block {
     pub own: Vec3,
     /// Pieces of the three rows.
     pub pieces: [Piece; 3],
-}
-
-impl Default for Piece {
-    fn default() -> Self {
-        Self { kind: kind::FIXED, gamma: 0.0, goal: 0.0, off: 0.0 }
-    }
 }
 
 /// A joint in a step.
@@ -171,21 +166,11 @@ impl Block {
 }
 
 impl Work {
-    /// A joint at the beginning of a step with sub-steps of length `h`.
+    /// A joint at the beginning of a step with sub-steps of length `h`; it is yet to be refreshed.
     pub fn new(slot: u32, joint: &Joint, state: JointState, between: Vec3, h: f32) -> Self {
-        let fresh = JointState { tag: joint.generation + 1, h, ..JointState::zeroed() };
-        let mut state = if state.tag == fresh.tag { state } else { fresh };
-        let scale = if state.h == h || state.h == 0.0 { 1.0 } else { h / state.h };
-        state.impulse = state.impulse.map(|x| scale * x);
-        state.torque = state.torque.map(|x| scale * x);
-        state.h = h;
-        if state.broken != 0 {
-            (state.impulse, state.torque) = ([0.0; 3], [0.0; 3]);
-        }
+        let state = begun(joint, state, h);
         let axes = if state.broken != 0 { 0 } else { joint.axes };
-        let still = Pose { translation: Vec3::ZERO, rotation: Quat::IDENTITY };
-        let blocks = [Block::default(); 2];
-        Self { slot, axes, state, between, frame: frame(joint, &still, &still, between), blocks }
+        Self { slot, axes, state, between, frame: Frame::NONE, blocks: [Block::zeroed(); 2] }
     }
 
     /// A share of the impulses of the last sub-step, in the axes as they are now.
@@ -320,7 +305,7 @@ impl Work {
                 let new = if block.own[row] > 0.0 {
                     Piece { kind: kind::LOCKED, gamma: 0.0, goal: -coordinates[row] / h, off: coordinates[row] }
                 } else {
-                    Piece::default()
+                    Piece::zeroed()
                 };
                 changed |= block.pieces[row].kind != new.kind;
                 block.pieces[row] = new;
@@ -360,9 +345,9 @@ impl Work {
     }
 
     /// By how much the separation of the locked rows will be off what is linear, as far as it is to be believed: spins
-    /// make it wrong, unless it is as it was in the last sub-step.
-    pub fn remainders(&mut self, joint: &Joint, a: &Body, b: &Body, h: f32) -> [Vec3; 2] {
-        let next = frame(joint, &a.predicted(h), &b.predicted(h), self.between);
+    /// make it wrong, unless it is as it was in the last sub-step. `next` is where the bodies will be.
+    pub fn remainders(&mut self, joint: &Joint, [a, b]: [&Body; 2], next: [&Pose; 2], h: f32) -> [Vec3; 2] {
+        let next = frame(joint, next[0], next[1], self.between);
         let now = self.frame;
         let spin = h * a.angular.length().max(b.angular.length()) / THETA;
         let still = 1.0 / (1.0 + spin * spin * spin * spin);

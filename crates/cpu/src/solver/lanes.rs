@@ -200,6 +200,18 @@ const MOST: usize = 8;
 /// In place of the rows where there is no body.
 static NO_ROWS: BodyRows = [f32x4::ZERO; ROWS];
 
+/// Row `r` of each body, as its four numbers of all bodies.
+#[inline(always)]
+pub(crate) fn columns<L: Lanes>(read: &impl Fn(usize) -> f32x4, index: L::Indices, r: usize) -> [L; 4] {
+    let mut rows = L::Rows::default();
+    for (row, &i) in rows.as_mut().iter_mut().zip(index.as_ref()) {
+        if i != NO_BODY {
+            *row = read(ROWS * i as usize + r);
+        }
+    }
+    L::columns(rows)
+}
+
 /// A body of each lane: looked up once for all its rows.
 pub(crate) struct Places<'a>([&'a BodyRows; MOST]);
 

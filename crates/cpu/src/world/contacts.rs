@@ -36,4 +36,10 @@ impl World {
         let kept = &self.kept;
         Ok(Joints::read(kept.control.step.into(), &kept.joint_set, &kept.states, &kept.joints.states))
     }
+
+    /// The solver's joints.
+    #[cfg(test)]
+    pub(crate) fn joints_mut(&mut self) -> &mut crate::joint::Joints {
+        &mut self.kept.joints
+    }
 }
