@@ -248,7 +248,37 @@ fn next_substep(
     }
 }
 
-// The second half of gravity and forces, for bodies that joints hold; no load of contacts of this sub-step.
+// Whether half of a body's kicks comes after it has moved, and half of what its contacts bear with it.
+fn comes_in_halves(i: u32) -> bool {
+    return (solver_bodies[i].touched & TOUCHED_JOINED) != 0u && solver_bodies[i].inverse_mass > 0.0
+        && step.solver == SOLVER_ONE_PASS;
+}
+
+// Adds to the body's velocities a share of what contacts have added in this sub-step; that stays what it was.
+fn add_load(i: u32, share: f32) {
+    let linear = share * (solver_bodies[i].linear_velocity - solver_bodies[i].linear_start);
+    let angular = share * (solver_bodies[i].angular_velocity - solver_bodies[i].angular_start);
+    solver_bodies[i].linear_velocity += linear;
+    solver_bodies[i].angular_velocity += angular;
+    solver_bodies[i].linear_start += linear;
+    solver_bodies[i].angular_start += angular;
+}
+
+// With joints, one pass: of the impulses that contacts begin with, half came with the last step's second half of gravity.
+@compute @workgroup_size(256)
+fn halve_load(
+    @builtin(workgroup_id) wg: vec3<u32>,
+    @builtin(num_workgroups) num: vec3<u32>,
+    @builtin(local_invocation_index) lid: u32,
+) {
+    let i = invocation(wg, num, lid);
+    if i < step.body_count && takes_part(i) && comes_in_halves(i) {
+        add_load(i, -0.5);
+    }
+}
+
+// The second half of gravity and forces, for bodies that joints hold, and half of what their contacts bear. No load of
+// contacts of this sub-step.
 fn kick_again(i: u32) {
     if !moves(work_states[i].flags) || (solver_bodies[i].touched & TOUCHED_JOINED) == 0u {
         return;
@@ -263,6 +293,9 @@ fn kick_again(i: u32) {
     solver_bodies[i].angular_velocity += angular;
     solver_bodies[i].linear_start += linear;
     solver_bodies[i].angular_start += angular;
+    if comes_in_halves(i) {
+        add_load(i, 0.5);
+    }
 }
 
 fn move_one(i: u32) {
@@ -316,6 +349,9 @@ fn start_next(
     if solver_bodies[i].inverse_mass > 0.0 {
         solver_bodies[i].linear_velocity += linear;
         solver_bodies[i].angular_velocity += angular;
+    }
+    if comes_in_halves(i) {
+        add_load(i, -0.5);
     }
 }
 

@@ -4,7 +4,7 @@ use crate::bounds::{STATE_LIMIT, moves};
 use crate::math::{finite, quat, rotate, rotate_back, unlocked, vec3};
 use crate::solver::one_pass::ease;
 use glam::{Quat, Vec3};
-use tumble_core::layout::{BodyProps, BodyState, SolverBody, StepParams, body_flags, locks, touched};
+use tumble_core::layout::{BodyProps, BodyState, SolverBody, StepParams, body_flags, locks, solver, touched};
 
 /// Largest turn of a body in a sub-step, rad; it bounds the number of pieces of a turn.
 pub const MAX_TURN: f32 = 32.0;
@@ -60,7 +60,31 @@ pub fn next_substep(body: &mut SolverBody, state: &BodyState, props: &BodyProps,
     }
 }
 
-/// The second half of gravity and forces, for bodies that joints hold; no load of contacts of this sub-step.
+/// Whether half of a body's kicks comes after it has moved, and half of what its contacts bear with it. (One pass alone
+/// carries that over.)
+fn comes_in_halves(body: &SolverBody, step: &StepParams) -> bool {
+    body.touched & touched::JOINED != 0 && body.inverse_mass > 0.0 && step.solver == solver::ONE_PASS
+}
+
+/// Adds to the body's velocities a share of what contacts have added in this sub-step; that stays what it was.
+fn add_load(body: &mut SolverBody, share: f32) {
+    let linear = share * (vec3(body.linear_velocity) - vec3(body.linear_start));
+    let angular = share * (vec3(body.angular_velocity) - vec3(body.angular_start));
+    body.linear_velocity = (vec3(body.linear_velocity) + linear).to_array();
+    body.angular_velocity = (vec3(body.angular_velocity) + angular).to_array();
+    body.linear_start = (vec3(body.linear_start) + linear).to_array();
+    body.angular_start = (vec3(body.angular_start) + angular).to_array();
+}
+
+/// With joints, one pass: of the impulses that contacts begin with, half came with the last step's second half of gravity.
+pub fn halve_load(body: &mut SolverBody, _: &BodyState, _: &BodyProps, step: &StepParams) {
+    if comes_in_halves(body, step) {
+        add_load(body, -0.5);
+    }
+}
+
+/// The second half of gravity and forces, for bodies that joints hold, and half of what their contacts bear: what lies on
+/// the floor has no velocity then, and its joints nothing to hold. No load of contacts of this sub-step.
 fn kick_again(body: &mut SolverBody, state: &BodyState, props: &BodyProps, step: &StepParams) {
     if !moves(state.flags) || body.touched & touched::JOINED == 0 {
         return;
@@ -71,6 +95,9 @@ fn kick_again(body: &mut SolverBody, state: &BodyState, props: &BodyProps, step:
     body.angular_velocity = (vec3(body.angular_velocity) + angular).to_array();
     body.linear_start = (vec3(body.linear_start) + linear).to_array();
     body.angular_start = (vec3(body.angular_start) + angular).to_array();
+    if comes_in_halves(body, step) {
+        add_load(body, 0.5);
+    }
 }
 
 /// With joints: moves the body; what turning adds to its angular velocity is no load of contacts.
@@ -97,6 +124,7 @@ pub fn start_next(body: &mut SolverBody, state: &BodyState, props: &BodyProps, s
         body.linear_velocity = (vec3(body.linear_velocity) + linear).to_array();
         body.angular_velocity = (vec3(body.angular_velocity) + angular).to_array();
     }
+    halve_load(body, state, props, step);
 }
 
 /// One pass: takes down how soft the load on the body is, and moves it.

@@ -32,6 +32,7 @@ pub(crate) struct Joint {
     move_body: Arc<Pass>,
     move_last: Arc<Pass>,
     start_next: Arc<Pass>,
+    halve_load: Arc<Pass>,
     /// The joints that are recorded.
     set: Arc<JointSet>,
     tables: JointTables,
@@ -63,8 +64,8 @@ impl Joint {
         let [warm_start, solve_loose, relax_loose] = [visit("warm_start")?, visit("solve")?, visit("relax")?];
         let begin_loose = pass("joint/batches", "begin")?;
         let stiffen = pass("joint/batches", "stiffen_bodies")?;
-        let [move_body, move_last, start_next] =
-            [pass("motion", "move_body")?, pass("motion", "move_last")?, pass("motion", "start_next")?];
+        let [move_body, move_last] = [pass("motion", "move_body")?, pass("motion", "move_last")?];
+        let [start_next, halve_load] = [pass("motion", "start_next")?, pass("motion", "halve_load")?];
         Ok(Self {
             mark,
             begin,
@@ -79,6 +80,7 @@ impl Joint {
             move_body,
             move_last,
             start_next,
+            halve_load,
             set: Arc::default(),
             tables: bytemuck::Zeroable::zeroed(),
             wide: Vec::new(),
@@ -158,6 +160,11 @@ impl Joint {
         let pass = if last { &self.move_last } else { &self.move_body };
         recorder.dispatch(pass, &[level_part(buffers, step)?], step.body_count.div_ceil(256))?;
         self.record(recorder, buffers, step, Part::Relax)
+    }
+
+    /// One pass: once contacts gave the impulses that they begin with.
+    pub(crate) fn record_loaded(&self, recorder: &mut Recorder, buffers: &Buffers, step: &StepParams) -> Result<()> {
+        recorder.dispatch(&self.halve_load, &[level_part(buffers, step)?], step.body_count.div_ceil(256))
     }
 
     /// One pass: the next sub-step begins.

@@ -156,6 +156,7 @@ impl Law {
             Self::OnePass { first, load, .. } => {
                 first.record(recorder, buffers, step)?;
                 load.record(recorder, buffers, step)?;
+                joints.map_or(Ok(()), |joints| joints.record_loaded(recorder, buffers, step))?;
             }
             Self::Jacobi { split, .. } => split.record(recorder, buffers, step)?,
             _ => {}

@@ -342,6 +342,7 @@ fn schedule(step: &StepParams, restitution: bool, joints: bool) -> Vec<Pass> {
     match step.solver {
         solver::ONE_PASS => {
             passes.extend([Bodies(motion::first_substep), Sweep(Visit::Load)]);
+            passes.extend(joints.then_some(Bodies(motion::halve_load)));
             for substep in 1..=step.substeps {
                 passes.extend(joint_passes(joints, &SOLVE_JOINTS));
                 passes.push(Sweep(Visit::Pass));
