@@ -1,5 +1,5 @@
-//! Chains, bridges, nets, figures beside rapier 0.36, same scenes, dt and sub-steps (4), in one run. Oracle: rapier, and
-//! analysis for the energy. The rule is no worse by more than 10 % or 0.1 mm, the aim a tenth of its separation; what is
+//! Chains, bridges, nets, figures beside rapier 0.36, same scenes and dt, in one run; as many sub-steps (4) where nothing
+//! touches, else each its own default (8 and 4), as with stacks and heaps. Oracle: rapier, and analysis for the energy. The rule is no worse by more than 10 % or 0.1 mm, the aim a tenth of its separation; what is
 //! reached is asserted. See the rows with `cargo test --release --test joints_beside -- --nocapture --test-threads 1`.
 
 #[expect(dead_code, reason = "this program uses a part")]
@@ -10,6 +10,7 @@ mod common;
 #[path = "common/jointed.rs"]
 mod jointed;
 
+use beside::{SUBSTEPS, substeps};
 use jointed::{BESIDE, CPU, JOINT_SUBSTEPS, Watched, all_held, params, row, watch};
 use tumble::prelude::*;
 use tumble_bench::hard_cases::{Ask, By, Case};
@@ -24,11 +25,13 @@ struct Held {
     /// Energy above that of the start, as a height of the whole mass, mm: what rounding may add and more. Coordinates are
     /// told to 2 µm at the height of 20 m where these scenes hang.
     gained: f64,
-    /// Overlap, where there are contacts: no more than this share of rapier's, or than 1 mm.
+    /// Overlap, where there are contacts: no more than this share of rapier's, or than 2 mm.
     overlap: Option<f64>,
+    /// Ours; rapier has its own.
+    substeps: u32,
 }
 
-const HELD: Held = Held { share: 0.1, most: 0.0, gained: 0.01, overlap: None };
+const HELD: Held = Held { share: 0.1, most: 0.0, gained: 0.01, overlap: None, substeps: JOINT_SUBSTEPS };
 
 /// Ten seconds on our sides and in rapier: of each kind one on the GPU, which in software takes ten seconds for it.
 fn beside(row_of: &str, name: &str, scene: Scene, held: &Held) -> Vec<Result<(), String>> {
@@ -41,12 +44,13 @@ fn beside(row_of: &str, name: &str, scene: Scene, held: &Held) -> Vec<Result<(),
     ];
     let by: &[By] = if on_both.contains(&name) { BESIDE } else { &By::WITHOUT_GPU };
     let case = Case::new(row_of, &format!("{name}, 10 s"));
-    let all: Vec<(By, Watched)> = by.iter().map(|&by| (by, watch(&scene, by, params(JOINT_SUBSTEPS), 600))).collect();
+    let all: Vec<(By, Watched)> = by.iter().map(|&by| (by, watch(&scene, by, params(held.substeps), 600))).collect();
     let theirs = all.iter().find(|(by, _)| *by == By::Rapier).expect("rapier runs").1;
     let mut missed = Vec::new();
     for &(by, seen) in &all {
+        let n = substeps(by, held.substeps);
         let mut told = |quantity: &str, unit: &str, value: f64, floor: f64, most: f64| {
-            missed.push(row(&case, by, JOINT_SUBSTEPS, quantity, unit, value, Ask::Beside(floor)));
+            missed.push(row(&case, by, n, quantity, unit, value, Ask::Beside(floor)));
             // Nothing here is not a number: see `watch`.
             if by != By::Rapier && value > most {
                 missed.push(Err(format!("{name}: {by:?}: {quantity}: {value} {unit}, more than {most}")));
@@ -58,11 +62,11 @@ fn beside(row_of: &str, name: &str, scene: Scene, held: &Held) -> Vec<Result<(),
             told("beyond limits by", "rad", seen.angle, 0.01, f64::INFINITY);
         }
         if let Some(share) = held.overlap {
-            told("overlap, second half", "mm", seen.deepest, 0.1, (share * theirs.deepest).max(1.0));
-            told("residual energy", "mJ/kg", seen.resting, 5e-4, f64::INFINITY);
+            told("overlap, second half", "mm", seen.deepest, 0.1, (share * theirs.deepest).max(2.0));
+            told("residual energy", "mJ/kg", seen.resting, 5e-4, 2.0 * theirs.resting);
         }
         let ask = Ask::AtMost(held.gained);
-        missed.push(row(&case, by, JOINT_SUBSTEPS, "energy gained, as a height", "mm", seen.gained, ask));
+        missed.push(row(&case, by, n, "energy gained, as a height", "mm", seen.gained, ask));
     }
     missed
 }
@@ -111,10 +115,11 @@ fn a_large_grid_holds_as_in_rapier() {
     all_held(beside("C08", "joint grid 32 x 32", scenes::joint_grid(32), &Held { share: 1.1, ..HELD }));
 }
 
-/// Chaotic: a heap's deepest overlap is that of a limb between two others.
+/// Chaotic: a heap's deepest overlap is that of a limb between two others. (Three heaps of 40: 15, 18 and 19 mm, rapier 29
+/// to 37.)
 #[test]
 fn figures_rest_in_a_heap() {
-    let held = Held { overlap: Some(1.5), ..HELD };
+    let held = Held { overlap: Some(1.0), substeps: SUBSTEPS, ..HELD };
     all_held(
         [
             beside("C09", "ragdoll, fallen", scenes::ragdoll(), &held),
@@ -124,18 +129,46 @@ fn figures_rest_in_a_heap() {
     );
 }
 
-/// The ball rolls to and fro on its chain, and presses links into the floor: 17 mm, rapier 10. Its course is chaotic, and so is
-/// how deep: the GPU was seen to leave 107 mm, a loss to know and no bound to test.
 #[test]
 fn chains_rest_on_a_floor() {
-    let held = Held { overlap: Some(2.5), ..HELD };
-    all_held(
-        [
-            beside("C10", "chain of 20 boxes, fallen", scenes::falling_chain(20), &held),
-            beside("C10", "ball 200 : 1 on a chain of 15, landed", scenes::wrecking_ball(15, 200.0), &held),
-        ]
-        .concat(),
-    );
+    let held = Held { overlap: Some(1.0), substeps: SUBSTEPS, ..HELD };
+    all_held(beside("C10", "chain of 20 boxes, fallen", scenes::falling_chain(20), &held));
+}
+
+/// A ball on a chain lands, rolls to and fro on it, and presses links into the floor. Its course is chaotic, and so is how
+/// deep: of 21 such scenes, 2 to 60 mm (rapier 3 to 48), with means of 15.5 and 15.8. So this is about the mean of nine, which
+/// may be off by a third of itself. Where the ball strikes, joints are apart for a step or two, by up to 43 mm (rapier 112).
+#[test]
+fn heavy_balls_land_on_their_chains() {
+    let case = Case::new("C10", "ball on its chain, landed, nine of them, 10 s");
+    let mut missed = Vec::new();
+    let mut all = Vec::new();
+    for &(by, n) in &[(By::Rapier, SUBSTEPS), (By::Cpu, SUBSTEPS), (By::Cpu, JOINT_SUBSTEPS)] {
+        let seen: Vec<Watched> = [14, 15, 16]
+            .into_iter()
+            .flat_map(|links| [150.0f32, 200.0, 250.0].map(|ratio| scenes::wrecking_ball(links, ratio)))
+            .map(|scene| watch(&scene, by, params(n), 600))
+            .collect();
+        let mean = |of: fn(&Watched) -> f64| seen.iter().map(of).sum::<f64>() / seen.len() as f64;
+        let most = |of: fn(&Watched) -> f64| seen.iter().map(of).fold(0.0, f64::max);
+        let now = [most(|s| s.apart), most(|s| s.late), mean(|s| s.deepest), most(|s| s.gained)];
+        let at = substeps(by, n);
+        if n == JOINT_SUBSTEPS {
+            missed.push(row(&case, by, at, "overlap with 4 sub-steps, mean", "mm", now[2], Ask::Said));
+            continue;
+        }
+        missed.push(row(&case, by, at, "separation, largest", "mm", now[0], Ask::Beside(0.1)));
+        missed.push(row(&case, by, at, "separation, second half, largest", "mm", now[1], Ask::Beside(0.1)));
+        missed.push(row(&case, by, at, "overlap, second half, mean", "mm", now[2], Ask::Beside(0.1)));
+        missed.push(row(&case, by, at, "energy gained, as a height, most", "mm", now[3], Ask::AtMost(HELD.gained)));
+        all.push(now);
+    }
+    let [theirs, ours] = [all[0], all[1]];
+    for (at, (name, share)) in [("apart", 1.0), ("apart later", 0.1), ("overlap", 1.5)].into_iter().enumerate() {
+        let told = || format!("{name}: {} mm, rapier {}", ours[at], theirs[at]);
+        missed.push((ours[at] <= share * theirs[at]).then_some(()).ok_or_else(told));
+    }
+    all_held(missed);
 }
 
 /// The separation over 1 to 16 sub-steps falls by more than their number, down to 2 µm, what rounding leaves at a height of
