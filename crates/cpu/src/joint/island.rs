@@ -85,7 +85,6 @@ impl Island {
         bodies: &impl Store,
         step: &StepParams,
     ) {
-        self.bodies.clear();
         self.read(scene, bodies);
         let joints = &scene.set.topology.joints[info.first_joint as usize..][..info.joint_count as usize];
         self.works.clear();
@@ -103,17 +102,14 @@ impl Island {
             work.rebuild(&self.bodies[a], &self.bodies[b]);
         }
         self.factor(scene);
+        self.write(bodies, |body, _, new| body.put_inertia(new));
     }
 
-    /// Reads the bodies as they are now. Their inertia is that of the factor: contacts see it from the first relaxation on.
+    /// Reads the bodies as they are now.
     fn read(&mut self, scene: &Scene<'_>, bodies: &impl Store) {
-        for (index, &slot) in self.slots.iter().enumerate() {
-            let now = Body::of(&bodies.get(slot as usize), &scene.states[slot as usize]);
-            match self.bodies.get_mut(index) {
-                Some(body) => *body = Body { inverse_inertia: body.inverse_inertia, ..now },
-                None => self.bodies.push(now),
-            }
-        }
+        self.bodies.clear();
+        let read = |&slot: &u32| Body::of(&bodies.get(slot as usize), &scene.states[slot as usize]);
+        self.bodies.extend(self.slots.iter().map(read));
     }
 
     /// Puts bodies back as `put` changes them.

@@ -156,7 +156,7 @@ impl<L: Lanes> IslandLanes<L> {
     }
 
     #[inline(always)]
-    fn read(&mut self, rows: &Shared<'_, f32x4>, inertia: bool) {
+    fn read(&mut self, rows: &Shared<'_, f32x4>) {
         // SAFETY: islands share no body that moves, and others are not written.
         let read = |i: usize| unsafe { rows.get(i) };
         for (k, body) in self.bodies.iter_mut().enumerate() {
@@ -165,21 +165,19 @@ impl<L: Lanes> IslandLanes<L> {
             let [wx, wy, wz, _] = columns::<L>(&read, index, 1);
             let [x, y, z, _] = columns::<L>(&read, index, 2);
             let delta = Q::new(columns::<L>(&read, index, 3));
+            let ([xx, yy, zz, _], [xy, xz, yz, _]) = (columns::<L>(&read, index, 4), columns::<L>(&read, index, 5));
             body.linear = V3::new(vx, vy, vz);
             body.angular = V3::new(wx, wy, wz);
             body.inverse_mass = inverse_mass;
-            if inertia {
-                let ([xx, yy, zz, _], [xy, xz, yz, _]) = (columns::<L>(&read, index, 4), columns::<L>(&read, index, 5));
-                body.inverse_inertia = M3::symmetric(V3::new(xx, yy, zz), V3::new(xy, xz, yz));
-            }
+            body.inverse_inertia = M3::symmetric(V3::new(xx, yy, zz), V3::new(xy, xz, yz));
             body.pose.translation = V3::new(x, y, z);
             body.pose.rotation = delta.times(self.made_of[k].0).normalized();
         }
     }
 
-    /// Puts bodies back; inertia and poses where they are relaxed.
+    /// Puts bodies back: velocities where `moves` is set, inertia and poses where `turns` is.
     #[inline(always)]
-    fn write(&self, rows: &Shared<'_, f32x4>, relaxed: bool) {
+    fn write(&self, rows: &Shared<'_, f32x4>, moves: bool, inertia: bool, poses: bool) {
         // SAFETY: islands share no body that moves, and others are not written.
         let read = |i: usize| unsafe { rows.get(i) };
         for (k, body) in self.bodies[..self.plan.moved()].iter().enumerate() {
@@ -192,10 +190,12 @@ impl<L: Lanes> IslandLanes<L> {
             let linear = V3::new(lx, ly, lz) + (body.linear - V3::new(vx, vy, vz));
             let mut angular = V3::new(ax, ay, az) + (body.angular - V3::new(wx, wy, wz));
             let (v, w) = (body.linear, body.angular);
-            put(rows, index, writes, 0, [v.x, v.y, v.z, body.inverse_mass]);
-            put(rows, index, writes, 1, [w.x, w.y, w.z, touched]);
-            put(rows, index, writes, START, [linear.x, linear.y, linear.z, weight]);
-            if relaxed {
+            if moves {
+                put(rows, index, writes, 0, [v.x, v.y, v.z, body.inverse_mass]);
+                put(rows, index, writes, 1, [w.x, w.y, w.z, touched]);
+                put(rows, index, writes, START, [linear.x, linear.y, linear.z, weight]);
+            }
+            if inertia {
                 let ([xx, yy, zz, level], [xy, xz, yz, parts]) =
                     (columns::<L>(&read, index, 4), columns::<L>(&read, index, 5));
                 let before = M3::symmetric(V3::new(xx, yy, zz), V3::new(xy, xz, yz));
@@ -207,7 +207,7 @@ impl<L: Lanes> IslandLanes<L> {
                 put(rows, index, writes, 5, [x.y, x.z, y.z, parts]);
             }
             put(rows, index, writes, START + 1, [angular.x, angular.y, angular.z, weighted]);
-            if relaxed {
+            if poses {
                 let [.., eigenvalue] = columns::<L>(&read, index, 2);
                 let at = body.pose.translation;
                 put(rows, index, writes, 2, [at.x, at.y, at.z, eigenvalue]);
@@ -219,7 +219,7 @@ impl<L: Lanes> IslandLanes<L> {
 
     #[inline(always)]
     fn begin(&mut self, rows: &Shared<'_, f32x4>, step: &StepParams) {
-        self.read(rows, true);
+        self.read(rows);
         self.stiffen(step.h);
         for (index, work) in self.works.iter_mut().enumerate() {
             let [a, b] = self.plan.ends[index];
@@ -230,11 +230,12 @@ impl<L: Lanes> IslandLanes<L> {
             work.rebuild(a, b);
         }
         self.factor();
+        self.write(rows, false, true, false);
     }
 
     #[inline(always)]
     fn solve(&mut self, rows: &Shared<'_, f32x4>, step: &StepParams) {
-        self.read(rows, false);
+        self.read(rows);
         for (next, body) in self.next.iter_mut().zip(&self.bodies) {
             *next = body.predicted(step.h);
         }
@@ -274,12 +275,12 @@ impl<L: Lanes> IslandLanes<L> {
                 break;
             }
         }
-        self.write(rows, false);
+        self.write(rows, true, false, false);
     }
 
     #[inline(always)]
     fn relax(&mut self, rows: &Shared<'_, f32x4>, step: &StepParams) {
-        self.read(rows, false);
+        self.read(rows);
         for work in &mut self.works {
             work.keep_impulses();
             work.forget_impulses();
@@ -297,7 +298,7 @@ impl<L: Lanes> IslandLanes<L> {
         for work in &mut self.works {
             work.add_impulses();
         }
-        self.write(rows, true);
+        self.write(rows, true, true, true);
     }
 
     #[inline(always)]
