@@ -115,8 +115,8 @@ fn a_large_grid_holds_as_in_rapier() {
     all_held(beside("C08", "joint grid 32 x 32", scenes::joint_grid(32), &Held { share: 1.1, ..HELD }));
 }
 
-/// Chaotic: a heap's deepest overlap is that of a limb between two others. (Three heaps of 40: 15, 18 and 19 mm, rapier 29
-/// to 37.)
+/// Chaotic: a heap's deepest overlap is that of a limb between two others. (Nine heaps of 40: 12 to 73 mm, mean 24; rapier 29
+/// to 41, mean 36.)
 #[test]
 fn figures_rest_in_a_heap() {
     let held = Held { overlap: Some(1.0), substeps: SUBSTEPS, ..HELD };
@@ -136,14 +136,14 @@ fn chains_rest_on_a_floor() {
 }
 
 /// A ball on a chain lands, rolls to and fro on it, and presses links into the floor. Its course is chaotic, and so is how
-/// deep: of 21 such scenes, 2 to 60 mm (rapier 3 to 48), with means of 15.5 and 15.8. So this is about the mean of nine, which
-/// may be off by a third of itself. Where the ball strikes, joints are apart for a step or two, by up to 43 mm (rapier 112).
+/// deep: of 21 such scenes, 0.3 to 58 mm (rapier 3 to 48), with means of 15.2 and 15.8. So this is about the mean of nine, which
+/// may be off by a third of itself. Where the ball strikes, joints are apart for a step or two: by 2 mm here, by 43 in a run that differed by rounding (rapier 112).
 #[test]
 fn heavy_balls_land_on_their_chains() {
     let case = Case::new("C10", "ball on its chain, landed, nine of them, 10 s");
     let mut missed = Vec::new();
     let mut all = Vec::new();
-    for &(by, n) in &[(By::Rapier, SUBSTEPS), (By::Cpu, SUBSTEPS), (By::Cpu, JOINT_SUBSTEPS)] {
+    for &(by, n) in &[(By::Cpu, SUBSTEPS), (By::Rapier, SUBSTEPS), (By::Cpu, JOINT_SUBSTEPS)] {
         let seen: Vec<Watched> = [14, 15, 16]
             .into_iter()
             .flat_map(|links| [150.0f32, 200.0, 250.0].map(|ratio| scenes::wrecking_ball(links, ratio)))
@@ -154,7 +154,8 @@ fn heavy_balls_land_on_their_chains() {
         let now = [most(|s| s.apart), most(|s| s.late), mean(|s| s.deepest), most(|s| s.gained)];
         let at = substeps(by, n);
         if n == JOINT_SUBSTEPS {
-            missed.push(row(&case, by, at, "overlap with 4 sub-steps, mean", "mm", now[2], Ask::Said));
+            let few = Case::new("C10", "ball on its chain, landed, nine of them, 10 s, 4 sub-steps");
+            missed.push(row(&few, by, at, "overlap, second half, mean", "mm", now[2], Ask::Said));
             continue;
         }
         missed.push(row(&case, by, at, "separation, largest", "mm", now[0], Ask::Beside(0.1)));
@@ -163,7 +164,7 @@ fn heavy_balls_land_on_their_chains() {
         missed.push(row(&case, by, at, "energy gained, as a height, most", "mm", now[3], Ask::AtMost(HELD.gained)));
         all.push(now);
     }
-    let [theirs, ours] = [all[0], all[1]];
+    let [ours, theirs] = [all[0], all[1]];
     for (at, (name, share)) in [("apart", 1.0), ("apart later", 0.1), ("overlap", 1.5)].into_iter().enumerate() {
         let told = || format!("{name}: {} mm, rapier {}", ours[at], theirs[at]);
         missed.push((ours[at] <= share * theirs[at]).then_some(()).ok_or_else(told));
